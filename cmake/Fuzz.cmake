@@ -1,0 +1,11 @@
+# fuzz/fuzz_NAME.c: a libFuzzer program a reader. Seeds are made by fuzz/make_seeds (no binary files in git).
+file(GLOB RIFFLE_FUZZ_SOURCES CONFIGURE_DEPENDS fuzz/fuzz_*.c)
+foreach(source ${RIFFLE_FUZZ_SOURCES})
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(${name} ${source})
+  target_compile_definitions(${name} PRIVATE _GNU_SOURCE)
+  target_compile_options(${name} PRIVATE -fsanitize=fuzzer)
+  target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+  target_include_directories(${name} PRIVATE src)
+  target_link_libraries(${name} PRIVATE riffle_static)
+endforeach()

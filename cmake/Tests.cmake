@@ -1,0 +1,21 @@
+# Every tests/test_*.c is one CTest program; tests/support/*.c is linked to all of them. Tests see src/ and the public headers.
+find_package(cmocka REQUIRED CONFIG)
+file(GLOB RIFFLE_TEST_SUPPORT CONFIGURE_DEPENDS tests/support/*.c)
+file(GLOB RIFFLE_TEST_SOURCES CONFIGURE_DEPENDS tests/test_*.c)
+
+add_library(riffle_test_support STATIC EXCLUDE_FROM_ALL tests/support/empty.c ${RIFFLE_TEST_SUPPORT})
+target_compile_definitions(riffle_test_support PRIVATE _GNU_SOURCE)
+target_include_directories(riffle_test_support PUBLIC src tests)
+target_link_libraries(riffle_test_support PUBLIC riffle_static kissfft::kissfft OpenMP::OpenMP_C m)
+
+foreach(source ${RIFFLE_TEST_SOURCES})
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(${name} ${source})
+  target_compile_definitions(${name} PRIVATE _GNU_SOURCE RF_SOURCE_DIR="${CMAKE_SOURCE_DIR}" RF_BUILD_DIR="${CMAKE_BINARY_DIR}")
+  target_link_libraries(${name} PRIVATE riffle_test_support cmocka ZLIB::ZLIB)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 900 ENVIRONMENT "RIFFLE_DATA=$ENV{RIFFLE_DATA}")
+  if(TARGET riffle)
+    add_dependencies(${name} riffle)
+  endif()
+endforeach()

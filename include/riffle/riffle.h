@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+// Riffle textures things that flow, by example. This header brings all the others.
+#pragma once
+
+#include "base.h"
+#include "data.h"
+#include "io.h"
+#include "lagrangian.h"
+#include "render.h"
+#include "warp.h"

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Small arithmetic that everything shares.
+#pragma once
+
+#include "riffle/data.h"
+
+#include <math.h>
+
+#define RF_PI 3.14159265358979323846f
+
+static inline int rf_min_int(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+static inline int rf_max_int(int a, int b)
+{
+    return a > b ? a : b;
+}
+
+static inline int rf_clamp_int(int x, int low, int high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/// NaN gives low.
+static inline float rf_clamp(float x, float low, float high)
+{
+    return x > low ? (x < high ? x : high) : low;
+}
+
+static inline float rf_lerp(float a, float b, float t)
+{
+    return a + t * (b - a);
+}
+
+/// x modulo n in 0 .. n - 1, for negative x too.
+static inline int rf_wrap_int(int x, int n)
+{
+    int r = x % n;
+    return r < 0 ? r + n : r;
+}
+
+/// Index reflected at both ends without repeating the end samples' neighbours twice: -1 gives 0, n gives n - 1.
+static inline int rf_mirror_int(int x, int n)
+{
+    int r = rf_wrap_int(x, 2 * n);
+    return r < n ? r : 2 * n - 1 - r;
+}
+
+static inline RfVec2 rf_vec2_add(RfVec2 a, RfVec2 b)
+{
+    return (RfVec2){a.x + b.x, a.y + b.y};
+}
+
+static inline RfVec2 rf_vec2_sub(RfVec2 a, RfVec2 b)
+{
+    return (RfVec2){a.x - b.x, a.y - b.y};
+}
+
+static inline float rf_vec2_length(RfVec2 a)
+{
+    return sqrtf(a.x * a.x + a.y * a.y);
+}

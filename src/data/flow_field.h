@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// One moment of a 2D flow, owned: what readers and simulators produce, and sampling of views.
+#pragma once
+
+#include "core/maths.h"
+#include "riffle/data.h"
+
+typedef struct RfFlowField
+{
+    int width, height;
+    /// [height][width][2], cells a frame, y down.
+    float *velocity;
+    /// [height][width], 0 outside the fluid; NULL: fluid everywhere.
+    uint8_t *mask;
+} RfFlowField;
+
+/// Velocities 0, no mask. Refuses sizes over RF_MAX_SIZE with RF_INVALID_ARGUMENT, so readers check before with their
+/// own message.
+RfResult rf_flow_field_create(int width, int height, RfFlowField *out);
+/// Adds a mask of 1s to a field that has none.
+RfResult rf_flow_field_add_mask(RfFlowField *field);
+void rf_flow_field_free(RfFlowField *field);
+/// Fills the vectors where valid[] is 0 from their valid neighbours, ring by ring (mean of the known 8 neighbours);
+/// returns how many. All invalid: zeros.
+int rf_flow_field_fill_invalid(RfFlowField *field, const uint8_t *valid);
+/// Borrowed view of a single moment at `time`.
+RfFlowView rf_flow_field_view(const RfFlowField *field, double time);
+
+/// Checks a view at the door: sizes, pointers, times, and that every number is finite (with the place).
+RfResult rf_flow_view_check(const RfFlowView *view);
+
+/// 0 at velocity_time and before, 1 at next_time and after.
+static inline float rf_flow_blend(const RfFlowView *view, double time)
+{
+    if (!view->next_velocity || view->next_time <= view->velocity_time)
+        return 0;
+    double t = (time - view->velocity_time) / (view->next_time - view->velocity_time);
+    return t > 0 ? (t < 1 ? (float)t : 1.0f) : 0.0f;
+}
+
+/// Velocity at a point in flow cells (cell (i, j) is centred on i + 0.5, j + 0.5), bilinear; outside the domain the
+/// border's. `blend` from rf_flow_blend. Clamping before the cast keeps far-away and NaN points defined.
+static inline RfVec2 rf_flow_sample(const RfFlowView *view, float x, float y, float blend)
+{
+    float u = rf_clamp(x - 0.5f, 0, (float)(view->width - 1)), v = rf_clamp(y - 0.5f, 0, (float)(view->height - 1));
+    int i0 = (int)u, i1 = rf_min_int(i0 + 1, view->width - 1);
+    int j0 = (int)v, j1 = rf_min_int(j0 + 1, view->height - 1);
+    float s = u - (float)i0, t = v - (float)j0;
+    float w00 = (1 - s) * (1 - t), w10 = s * (1 - t), w01 = (1 - s) * t, w11 = s * t;
+    size_t row0 = (size_t)j0 * (size_t)view->width, row1 = (size_t)j1 * (size_t)view->width;
+    size_t k00 = 2 * (row0 + (size_t)i0), k10 = 2 * (row0 + (size_t)i1), k01 = 2 * (row1 + (size_t)i0),
+           k11 = 2 * (row1 + (size_t)i1);
+    const float *a = view->velocity, *b = view->next_velocity;
+    RfVec2 r = {w00 * a[k00] + w10 * a[k10] + w01 * a[k01] + w11 * a[k11],
+                w00 * a[k00 + 1] + w10 * a[k10 + 1] + w01 * a[k01 + 1] + w11 * a[k11 + 1]};
+    if (b && blend > 0)
+    {
+        RfVec2 n = {w00 * b[k00] + w10 * b[k10] + w01 * b[k01] + w11 * b[k11],
+                    w00 * b[k00 + 1] + w10 * b[k10 + 1] + w01 * b[k01 + 1] + w11 * b[k11 + 1]};
+        r.x += blend * (n.x - r.x);
+        r.y += blend * (n.y - r.y);
+    }
+    return r;
+}
+
+/// True if the point, in flow cells, lies in the domain and in a cell of fluid.
+static inline bool rf_flow_inside(const RfFlowView *view, float x, float y)
+{
+    if (!(x >= 0 && y >= 0 && x < (float)view->width && y < (float)view->height))
+        return false;
+    return !view->mask || view->mask[(size_t)y * (size_t)view->width + (size_t)x] != 0;
+}
