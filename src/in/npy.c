@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// NumPy's .npy, versions 1 to 3: "\x93NUMPY", version, length of the header, and the header as a Python literal,
+// {'descr': '<f4', 'fortran_order': False, 'shape': (60, 80, 2), }. The three keys come in any order, so each is
+// looked for by name; nothing else of Python is understood.
+#include "in/npy.h"
+
+#include "core/result.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum
+{
+    LONGEST_HEADER = 4096
+};
+
+bool rf_npy_probe(const uint8_t *bytes, size_t size)
+{
+    return size >= 6 && memcmp(bytes, "\x93NUMPY", 6) == 0;
+}
+
+// Where a key's value begins, or NULL.
+static const char *value_of(const char *text, const char *key)
+{
+    const char *found = strstr(text, key);
+    found = found ? strchr(found + strlen(key), ':') : NULL;
+    if (!found)
+        return NULL;
+    ++found;
+    return found + strspn(found, " ");
+}
+
+static bool parse_descr(const char *value, RfNpyHeader *out)
+{
+    if (!value || (*value != '\'' && *value != '"'))
+        return false;
+    static const struct
+    {
+        const char *code;
+        RfNumberKind kind;
+    } kinds[] = {{"f2", RF_NUMBER_F16}, {"f4", RF_NUMBER_F32}, {"f8", RF_NUMBER_F64}, {"i1", RF_NUMBER_I8},
+                 {"u1", RF_NUMBER_U8},  {"i2", RF_NUMBER_I16}, {"u2", RF_NUMBER_U16}, {"i4", RF_NUMBER_I32},
+                 {"u4", RF_NUMBER_U32}, {"i8", RF_NUMBER_I64}, {"u8", RF_NUMBER_U64}};
+    if (!strchr("<>|=", value[1]) || value[1] == '\0')
+        return false;
+    out->big_endian = value[1] == '>';
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; ++i)
+        if (strncmp(value + 2, kinds[i].code, 2) == 0 && value[4] == value[0])
+        {
+            out->kind = kinds[i].kind;
+            return true;
+        }
+    return false;
+}
+
+static bool parse_shape(const char *value, RfNpyHeader *out)
+{
+    if (!value || *value != '(')
+        return false;
+    const char *p = value + 1;
+    for (;;)
+    {
+        p += strspn(p, " ,");
+        if (*p == ')')
+            return true;
+        char *end;
+        errno = 0;
+        if (*p < '0' || *p > '9' || out->dimension_count == RF_NPY_MAX_DIMENSIONS)
+            return false;
+        out->shape[out->dimension_count++] = strtoull(p, &end, 10);
+        if (errno || (*end != ',' && *end != ')' && *end != ' ' && *end != 'L'))
+            return false;
+        p = end + (*end == 'L');
+    }
+}
+
+static RfResult parse_literal(const RfFlowSource *source, const char *place, const char *text, RfNpyHeader *out)
+{
+    const char *order = value_of(text, "fortran_order");
+    if (!parse_descr(value_of(text, "descr"), out))
+        return rf_fail(RF_UNSUPPORTED, source->path, place,
+                       "numbers of this kind are not read: save the array as float32, float64, float16 or integers");
+    if (!order || (strncmp(order, "True", 4) != 0 && strncmp(order, "False", 5) != 0))
+        return rf_fail(RF_BAD_INPUT, source->path, place, "the header does not say fortran_order");
+    out->fortran_order = order[0] == 'T';
+    if (!parse_shape(value_of(text, "shape"), out))
+        return rf_fail(RF_BAD_INPUT, source->path, place, "the header's shape cannot be read");
+    return RF_OK;
+}
+
+RfResult rf_npy_header(const RfFlowSource *source, const char *place, RfNpyHeader *out)
+{
+    *out = (RfNpyHeader){0};
+    place = place ? place : "header";
+    const uint8_t *bytes = source->bytes;
+    if (!rf_npy_probe(bytes, source->size))
+        return rf_fail(RF_BAD_INPUT, source->path, place, "not a NumPy array: it does not begin with \\x93NUMPY");
+    size_t fixed = source->size > 6 && bytes[6] > 1 ? 12 : 10;
+    if (source->size < fixed)
+        return rf_fail(RF_BAD_INPUT, source->path, place, "the file ends inside the header (%zu of %zu bytes)",
+                       source->size, fixed);
+    if (bytes[6] < 1 || bytes[6] > 3)
+        return rf_fail(RF_UNSUPPORTED, source->path, place, "version %d of the format is not read: 1 to 3 are",
+                       bytes[6]);
+    size_t length = fixed == 10 ? rf_load_u16(bytes + 8, false) : rf_load_u32(bytes + 8, false);
+    if (length > source->size - fixed)
+        return rf_fail(RF_BAD_INPUT, source->path, place, "the file ends inside the header (%zu of %zu bytes)",
+                       source->size, fixed + length);
+    char text[LONGEST_HEADER];
+    if (length >= sizeof text)
+        return rf_fail(RF_UNSUPPORTED, source->path, place,
+                       "the header has %zu bytes: an array of plain numbers has "
+                       "less than %d",
+                       length, LONGEST_HEADER);
+    memcpy(text, bytes + fixed, length);
+    text[length] = '\0';
+    out->data_offset = fixed + length;
+    return parse_literal(source, place, text, out);
+}
+
+// The shape as [moments, height, width, 2].
+static RfResult flow_shape(const RfFlowSource *source, const char *place, const RfNpyHeader *header, uint64_t shape[4])
+{
+    int n = header->dimension_count;
+    if ((n != 3 && n != 4) || header->shape[n - 1] != 2)
+    {
+        char text[128] = "";
+        for (int i = 0; i < n; ++i)
+            snprintf(text + strlen(text), sizeof text - strlen(text), "%s%llu", i ? ", " : "",
+                     (unsigned long long)header->shape[i]);
+        return rf_fail(RF_BAD_INPUT, source->path, place,
+                       "the shape is [%s]: a flow has [height, width, 2] or [moments, height, width, 2]", text);
+    }
+    shape[0] = n == 4 ? header->shape[0] : 1;
+    for (int i = 1; i < 4; ++i)
+        shape[i] = header->shape[n - 4 + i];
+    if (shape[0] < 1 || shape[0] > 1000000 || shape[1] < 1 || shape[1] > RF_MAX_SIZE || shape[2] < 1 ||
+        shape[2] > RF_MAX_SIZE)
+        return rf_fail(RF_BAD_INPUT, source->path, place,
+                       "%llu moments of %llu x %llu cells: each side must be 1 to %d, moments 1 to 1000000",
+                       (unsigned long long)shape[0], (unsigned long long)shape[2], (unsigned long long)shape[1],
+                       RF_MAX_SIZE);
+    // At most 2^20 * 2^15 * 2^15 * 2 * 8 = 2^54 bytes: no overflow.
+    uint64_t wanted = shape[0] * shape[1] * shape[2] * 2 * (uint64_t)rf_number_size(header->kind);
+    if (wanted > source->size - header->data_offset)
+        return rf_fail(RF_BAD_INPUT, source->path, place, "the shape needs %llu bytes of numbers, %zu are there",
+                       (unsigned long long)wanted, source->size - header->data_offset);
+    return RF_OK;
+}
+
+static void copy_moment(const RfFlowSource *source, const RfNpyHeader *header, const uint64_t shape[4], uint64_t moment,
+                        float *velocity)
+{
+    size_t stride[4] = {0}, step = (size_t)rf_number_size(header->kind);
+    for (int i = 0; i < 4; ++i)
+    {
+        int axis = header->fortran_order ? i : 3 - i;
+        stride[axis] = step;
+        step *= (size_t)shape[axis];
+    }
+    const uint8_t *base = source->bytes + header->data_offset + moment * stride[0];
+    for (size_t y = 0; y < shape[1]; ++y)
+        for (size_t x = 0; x < shape[2]; ++x)
+            for (size_t c = 0; c < 2; ++c)
+                *velocity++ = (float)rf_load_number(base + y * stride[1] + x * stride[2] + c * stride[3], header->kind,
+                                                    header->big_endian);
+}
+
+RfResult rf_npy_read(const RfFlowSource *source, const char *place, int moment, RfFlowMoment *out)
+{
+    RfNpyHeader header;
+    uint64_t shape[4];
+    RF_TRY(rf_npy_header(source, place, &header));
+    RF_TRY(flow_shape(source, place ? place : "header", &header, shape));
+    RF_TRY(rf_flow_moment_create(source, (int64_t)shape[2], (int64_t)shape[1], out));
+    copy_moment(source, &header, shape, (uint64_t)moment, out->field.velocity);
+    out->moment_count = (int)shape[0];
+    snprintf(out->conventions, sizeof out->conventions, "cells a frame, y down, as in the file");
+    return RF_OK;
+}
+
+static RfResult npy_read(const RfFlowSource *source, int moment, RfFlowMoment *out)
+{
+    return rf_npy_read(source, NULL, moment, out);
+}
+
+const RfFlowFormat rf_flow_format_npy = {"npy", "npy", rf_npy_probe, npy_read};
