@@ -38,35 +38,62 @@ static inline float rf_flow_blend(const RfFlowView *view, double time)
     return t > 0 ? (t < 1 ? (float)t : 1.0f) : 0.0f;
 }
 
-/// Velocity at a point in flow cells (cell (i, j) is centred on i + 0.5, j + 0.5), bilinear; outside the domain the
-/// border's. `blend` from rf_flow_blend. Clamping before the cast keeps far-away and NaN points defined.
-static inline RfVec2 rf_flow_sample(const RfFlowView *view, float x, float y, float blend)
+/// The four cells round a point in flow cells, clamped to the domain, with their bilinear weights. Clamping before the
+/// cast keeps far-away and NaN points defined.
+typedef struct RfFlowCorners
+{
+    size_t cell[4];
+    float weight[4];
+} RfFlowCorners;
+
+static inline RfFlowCorners rf_flow_corners(const RfFlowView *view, float x, float y)
 {
     float u = rf_clamp(x - 0.5f, 0, (float)(view->width - 1)), v = rf_clamp(y - 0.5f, 0, (float)(view->height - 1));
     int i0 = (int)u, i1 = rf_min_int(i0 + 1, view->width - 1);
     int j0 = (int)v, j1 = rf_min_int(j0 + 1, view->height - 1);
     float s = u - (float)i0, t = v - (float)j0;
-    float w00 = (1 - s) * (1 - t), w10 = s * (1 - t), w01 = (1 - s) * t, w11 = s * t;
     size_t row0 = (size_t)j0 * (size_t)view->width, row1 = (size_t)j1 * (size_t)view->width;
-    size_t k00 = 2 * (row0 + (size_t)i0), k10 = 2 * (row0 + (size_t)i1), k01 = 2 * (row1 + (size_t)i0),
-           k11 = 2 * (row1 + (size_t)i1);
-    const float *a = view->velocity, *b = view->next_velocity;
-    RfVec2 r = {w00 * a[k00] + w10 * a[k10] + w01 * a[k01] + w11 * a[k11],
-                w00 * a[k00 + 1] + w10 * a[k10 + 1] + w01 * a[k01 + 1] + w11 * a[k11 + 1]};
-    if (b && blend > 0)
-    {
-        RfVec2 n = {w00 * b[k00] + w10 * b[k10] + w01 * b[k01] + w11 * b[k11],
-                    w00 * b[k00 + 1] + w10 * b[k10 + 1] + w01 * b[k01 + 1] + w11 * b[k11 + 1]};
-        r.x += blend * (n.x - r.x);
-        r.y += blend * (n.y - r.y);
-    }
-    return r;
+    return (RfFlowCorners){{row0 + (size_t)i0, row0 + (size_t)i1, row1 + (size_t)i0, row1 + (size_t)i1},
+                           {(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t}};
 }
 
-/// True if the point, in flow cells, lies in the domain and in a cell of fluid.
+/// True if the point, in flow cells, lies in the domain and in the fluid: where the mask, interpolated between cell
+/// centres, is half or more. So the shore is a smooth line at any frame size.
 static inline bool rf_flow_inside(const RfFlowView *view, float x, float y)
 {
     if (!(x >= 0 && y >= 0 && x < (float)view->width && y < (float)view->height))
         return false;
-    return !view->mask || view->mask[(size_t)y * (size_t)view->width + (size_t)x] != 0;
+    if (!view->mask)
+        return true;
+    RfFlowCorners c = rf_flow_corners(view, x, y);
+    float fluid = 0;
+    for (int k = 0; k < 4; ++k)
+        fluid += view->mask[c.cell[k]] ? c.weight[k] : 0;
+    return fluid >= 0.5f;
+}
+
+/// Velocity at a point in flow cells (cell (i, j) is centred on i + 0.5, j + 0.5), bilinear over the fluid's cells
+/// alone, so that land does not slow the shore; 0 with no fluid cell near; outside the domain the border's. `blend`
+/// from rf_flow_blend.
+static inline RfVec2 rf_flow_sample(const RfFlowView *view, float x, float y, float blend)
+{
+    RfFlowCorners c = rf_flow_corners(view, x, y);
+    float total = 0;
+    RfVec2 r = {0, 0};
+    const float *a = view->velocity, *b = view->next_velocity && blend > 0 ? view->next_velocity : NULL;
+    for (int k = 0; k < 4; ++k)
+    {
+        float w = view->mask && !view->mask[c.cell[k]] ? 0 : c.weight[k];
+        const float *p = a + 2 * c.cell[k];
+        RfVec2 v = {p[0], p[1]};
+        if (b)
+        {
+            const float *q = b + 2 * c.cell[k];
+            v = (RfVec2){v.x + blend * (q[0] - v.x), v.y + blend * (q[1] - v.y)};
+        }
+        r.x += w * v.x;
+        r.y += w * v.y;
+        total += w;
+    }
+    return total > 0 ? (RfVec2){r.x / total, r.y / total} : r;
 }
