@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fluids/builtin.h"
+
+#include "core/memory.h"
+#include "core/result.h"
+#include "fluids/scene.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const RfSceneClass *const scenes[] = {
+    &rf_scene_vortex, &rf_scene_shear, &rf_scene_gyre, &rf_scene_uniform, &rf_scene_rotation,
+};
+
+static const RfExemplarClass *const exemplars[] = {
+    &rf_exemplar_noise,
+    &rf_exemplar_checker,
+};
+
+enum
+{
+    SCENE_COUNT = sizeof scenes / sizeof scenes[0],
+    EXEMPLAR_COUNT = sizeof exemplars / sizeof exemplars[0]
+};
+
+struct RfFlowScene
+{
+    const RfSceneClass *class;
+    RfParameters parameters;
+    void *state;
+    /// Where the state stands.
+    int moment;
+};
+
+static RfResult refuse_name(const char *spec, const char *kind)
+{
+    char file[400], names[400] = "";
+    snprintf(file, sizeof file, "builtin:%.380s", spec);
+    int count;
+    const RfBuiltin *table = rf_builtin_table(&count);
+    for (int i = 0; i < count; ++i)
+    {
+        size_t used = strlen(names);
+        if (strcmp(table[i].kind, kind) == 0)
+            snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "", table[i].name);
+    }
+    return rf_fail(RF_BAD_INPUT, file, NULL, "there is no built-in %s of that name; there are: %s", kind, names);
+}
+
+RfResult rf_flow_scene_create(const char *spec, RfFlowScene **out)
+{
+    RF_REQUIRE(spec && out, "a flow scene needs a name and a place to put it");
+    *out = NULL;
+    const RfSceneClass *class = NULL;
+    for (int i = 0; i < SCENE_COUNT && !class; ++i)
+        if (rf_parameters_named(spec, scenes[i]->name))
+            class = scenes[i];
+    if (!class)
+        return refuse_name(spec, "flow");
+    RfParameters parameters;
+    RF_TRY(rf_parameters_read(spec, class->defaults, class->ranges, &parameters));
+    RfFlowScene *scene = rf_allocate_zero(1, sizeof *scene);
+    if (!scene)
+        return RF_OUT_OF_MEMORY;
+    *scene = (RfFlowScene){.class = class, .parameters = parameters};
+    RfResult result = class->create ? class->create(&parameters, &scene->state) : RF_OK;
+    if (result != RF_OK)
+        rf_release(scene);
+    else
+        *out = scene;
+    return result;
+}
+
+void rf_flow_scene_destroy(RfFlowScene *scene)
+{
+    if (!scene)
+        return;
+    if (scene->class->destroy)
+        scene->class->destroy(scene->state);
+    rf_release(scene);
+}
+
+int rf_flow_scene_moment_count(const RfFlowScene *scene)
+{
+    return scene->class->moment_count;
+}
+
+RfResult rf_flow_scene_moment(RfFlowScene *scene, int moment, RfFlowField *out)
+{
+    RF_REQUIRE(scene && out && moment >= 0, "a moment of a flow scene is 0 or more");
+    if (scene->class->advance)
+    {
+        if (moment < scene->moment)
+        {
+            scene->class->restart(scene->state);
+            scene->moment = 0;
+        }
+        for (; scene->moment < moment; ++scene->moment)
+            scene->class->advance(scene->state);
+    }
+    RF_TRY(rf_flow_field_create(scene->parameters.width, scene->parameters.height, out));
+    RfResult result = scene->class->draw(&scene->parameters, scene->state, moment, out);
+    if (result != RF_OK)
+        rf_flow_field_free(out);
+    return result;
+}
+
+/// Clamps, and rounds colours to 8 bits so that a picture written as PNG and read again is the same exemplar. Height
+/// stays as fine as it was computed.
+static void finish(RfImage *image)
+{
+    RfImageView view = rf_image_view(image);
+    for (int j = 0; j < view.height; ++j)
+        for (int i = 0; i < view.width * view.channels; ++i)
+        {
+            float *value = view.pixels + (ptrdiff_t)j * view.row_stride + i;
+            *value = rf_clamp(*value, 0, 1);
+            if (view.channels < 4 || i % view.channels < 3)
+                *value = floorf(*value * 255 + 0.5f) / 255;
+        }
+    if (view.channels == 4)
+        rf_image_set_channel_name(image, 3, "height");
+    rf_image_set_origin(image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
+}
+
+RfResult rf_exemplar_draw(const char *spec, RfImage **out)
+{
+    RF_REQUIRE(spec && out, "an exemplar needs a name and a place to put it");
+    *out = NULL;
+    const RfExemplarClass *class = NULL;
+    for (int i = 0; i < EXEMPLAR_COUNT && !class; ++i)
+        if (rf_parameters_named(spec, exemplars[i]->name))
+            class = exemplars[i];
+    if (!class)
+        return refuse_name(spec, "exemplar");
+    RfParameters parameters;
+    RF_TRY(rf_parameters_read(spec, class->defaults, class->ranges, &parameters));
+    RfImage *image;
+    RF_TRY(rf_image_create(parameters.width, parameters.height, class->channels, &image));
+    RfImageView view = rf_image_view(image);
+    RfResult result = class->draw(&parameters, &view);
+    if (result != RF_OK)
+    {
+        rf_image_destroy(image);
+        return result;
+    }
+    finish(image);
+    *out = image;
+    return RF_OK;
+}
+
+const RfBuiltin *rf_builtin_table(int *count)
+{
+    // Filled at every call with the same constants, a thread of its own each: the classes are the only list.
+    static _Thread_local RfBuiltin table[SCENE_COUNT + EXEMPLAR_COUNT];
+    for (int i = 0; i < SCENE_COUNT; ++i)
+        table[i] = (RfBuiltin){scenes[i]->name, "flow", scenes[i]->defaults, scenes[i]->sentence};
+    for (int i = 0; i < EXEMPLAR_COUNT; ++i)
+        table[SCENE_COUNT + i] =
+            (RfBuiltin){exemplars[i]->name, "exemplar", exemplars[i]->defaults, exemplars[i]->sentence};
+    if (count)
+        *count = SCENE_COUNT + EXEMPLAR_COUNT;
+    return table;
+}

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fluids/drawing.h"
+
+#include "core/parallel.h"
+#include "data/colour.h"
+
+enum
+{
+    SAMPLES = 3
+};
+
+const RfParameterRange rf_drawing_ranges[] = {{"size", RF_PARAMETER_SIZE, 8, 4096},
+                                              {"seed", RF_PARAMETER_INTEGER, 0, 4294967295.0},
+                                              {"scale", RF_PARAMETER_NUMBER, 0.25, 4},
+                                              {0}};
+
+typedef struct Canvas
+{
+    const RfTorus *torus;
+    const RfImageView *image;
+    RfPaintFn *paint;
+    const void *context;
+} Canvas;
+
+RfTorus rf_torus(const RfParameters *parameters)
+{
+    float unit = (float)rf_min_int(parameters->width, parameters->height) * (float)rf_parameter(parameters, "scale");
+    return (RfTorus){.span_x = (float)parameters->width / unit,
+                     .span_y = (float)parameters->height / unit,
+                     .seed = (uint64_t)rf_parameter(parameters, "seed")};
+}
+
+static void paint_pixel(const Canvas *canvas, int i, int j, float *pixel)
+{
+    const RfImageView *image = canvas->image;
+    float sum[RF_MAX_CHANNELS] = {0}, colour[RF_MAX_CHANNELS];
+    for (int k = 0; k < SAMPLES * SAMPLES; ++k)
+    {
+        float x = (float)i + ((float)(k % SAMPLES) + 0.5f) / SAMPLES;
+        float y = (float)j + ((float)(k / SAMPLES) + 0.5f) / SAMPLES;
+        canvas->paint(canvas->context, x / (float)image->width * canvas->torus->span_x,
+                      y / (float)image->height * canvas->torus->span_y, colour);
+        for (int c = 0; c < image->channels; ++c)
+            sum[c] += c < 3 ? rf_srgb_to_linear(rf_clamp(colour[c], 0, 1)) : colour[c];
+    }
+    for (int c = 0; c < image->channels; ++c)
+    {
+        float mean = sum[c] / (SAMPLES * SAMPLES);
+        pixel[c] = c < 3 ? rf_linear_to_srgb(mean) : mean;
+    }
+}
+
+static void paint_row(void *context, int item, int worker)
+{
+    (void)worker;
+    const Canvas *canvas = context;
+    for (int i = 0; i < canvas->image->width; ++i)
+        paint_pixel(canvas, i, item,
+                    canvas->image->pixels + (ptrdiff_t)item * canvas->image->row_stride + i * canvas->image->channels);
+}
+
+void rf_paint(const RfTorus *torus, const RfImageView *image, RfPaintFn *paint, const void *context)
+{
+    Canvas canvas = {torus, image, paint, context};
+    rf_parallel_for(image->height, paint_row, &canvas);
+}
+
+/// Dot product of a lattice point's random direction with the way from it to the point.
+static float lattice_slope(const RfTorus *torus, int i, int j, float s, float t, uint64_t stream)
+{
+    float angle = 2 * RF_PI * rf_random_float(torus->seed, stream, ((uint64_t)(uint32_t)j << 32) | (uint32_t)i, 0);
+    return cosf(angle) * s + sinf(angle) * t;
+}
+
+float rf_torus_noise(const RfTorus *torus, float x, float y, float cells, uint64_t stream)
+{
+    int columns = rf_max_int(1, (int)lroundf(cells * torus->span_x));
+    int rows = rf_max_int(1, (int)lroundf(cells * torus->span_y));
+    float u = x / torus->span_x * (float)columns, v = y / torus->span_y * (float)rows;
+    float fu = floorf(u), fv = floorf(v), s = u - fu, t = v - fv;
+    int i0 = rf_wrap_int((int)fu, columns), i1 = i0 + 1 < columns ? i0 + 1 : 0;
+    int j0 = rf_wrap_int((int)fv, rows), j1 = j0 + 1 < rows ? j0 + 1 : 0;
+    float fade_s = s * s * s * (s * (s * 6 - 15) + 10), fade_t = t * t * t * (t * (t * 6 - 15) + 10);
+    float top =
+        rf_lerp(lattice_slope(torus, i0, j0, s, t, stream), lattice_slope(torus, i1, j0, s - 1, t, stream), fade_s);
+    float bottom = rf_lerp(lattice_slope(torus, i0, j1, s, t - 1, stream),
+                           lattice_slope(torus, i1, j1, s - 1, t - 1, stream), fade_s);
+    return 1.5f * rf_lerp(top, bottom, fade_t);
+}
+
+float rf_torus_octaves(const RfTorus *torus, float x, float y, float cells, int octaves, uint64_t stream)
+{
+    float sum = 0, amplitude = 0.6f;
+    for (int octave = 0; octave < octaves; ++octave)
+    {
+        sum += amplitude * rf_torus_noise(torus, x, y, cells, stream + (uint64_t)octave);
+        amplitude *= 0.5f;
+        cells *= 2;
+    }
+    return sum;
+}
