@@ -1,5 +1,7 @@
 # bench/*.c: each one program, linked against the static library and the shared scenes in tests/support.
-file(GLOB RIFFLE_BENCH_SOURCES CONFIGURE_DEPENDS bench/*.c)
+if(TARGET riffle_test_support)
+  file(GLOB RIFFLE_BENCH_SOURCES CONFIGURE_DEPENDS bench/*.c)
+endif()
 foreach(source ${RIFFLE_BENCH_SOURCES})
   get_filename_component(name ${source} NAME_WE)
   add_executable(bench_${name} ${source})

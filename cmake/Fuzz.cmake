@@ -1,4 +1,11 @@
-# fuzz/fuzz_NAME.c: a libFuzzer program a reader. Seeds are made by fuzz/make_seeds (no binary files in git).
+# fuzz/fuzz_NAME.c: a libFuzzer program a reader. Its seeds are written by a program too, fuzz/make_NAME_seeds.c: no
+# binary files in git.
+if(NOT CMAKE_C_COMPILER_ID MATCHES "Clang")
+  message(FATAL_ERROR "RIFFLE_FUZZ needs clang: cmake --preset sanitizers")
+endif()
+# The library reports the paths taken, too: without that the fuzzers grope in the dark.
+target_compile_options(riffle_objects PRIVATE -fsanitize=fuzzer-no-link)
+
 file(GLOB RIFFLE_FUZZ_SOURCES CONFIGURE_DEPENDS fuzz/fuzz_*.c)
 foreach(source ${RIFFLE_FUZZ_SOURCES})
   get_filename_component(name ${source} NAME_WE)
@@ -8,4 +15,13 @@ foreach(source ${RIFFLE_FUZZ_SOURCES})
   target_link_options(${name} PRIVATE -fsanitize=fuzzer)
   target_include_directories(${name} PRIVATE src)
   target_link_libraries(${name} PRIVATE riffle_static)
+endforeach()
+
+file(GLOB RIFFLE_SEED_SOURCES CONFIGURE_DEPENDS fuzz/make_*.c)
+foreach(source ${RIFFLE_SEED_SOURCES})
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(${name} ${source})
+  target_compile_definitions(${name} PRIVATE _GNU_SOURCE)
+  target_include_directories(${name} PRIVATE src)
+  target_link_libraries(${name} PRIVATE riffle_static ZLIB::ZLIB)
 endforeach()

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+# Every target installs what it needs first (Debian packages, cmake/setup.sh).
+BUILD := build
+FORMATTED = $(shell git ls-files '*.c' '*.h')
+
+.PHONY: all demo test bench gallery format install clean setup-% configure
+
+all: setup-build configure
+	@cmake --build $(BUILD) --target riffle riffle_static riffle_shared
+
+configure:
+	@mkdir -p $(BUILD)
+	@cmake --preset release -B $(BUILD) $(CONFIGURE) >$(BUILD)/configure.log 2>&1 || { cat $(BUILD)/configure.log; exit 1; }
+
+# Frames, videos and a contact sheet from built-in inputs, in build/demo.
+demo: setup-demo configure
+	@cmake --build $(BUILD) --target riffle contact_sheet
+	@bash cmake/demo.sh $(BUILD)
+
+# Ends with "N passed, N failed, N skipped".
+test: CONFIGURE = -DRIFFLE_REQUIRE_TESTS=ON
+test: setup-test configure
+	@cmake --build $(BUILD)
+	@bash cmake/run_tests.sh $(BUILD)
+
+bench: setup-test configure
+	@cmake --build $(BUILD)
+	@bash cmake/run_benches.sh $(BUILD)
+
+# Contact sheets of the real inputs ($$RIFFLE_DATA, else ../shared/data) and the built-in ones, in build/gallery.
+# "make gallery DOCS=1" also renews the pictures in docs/gallery, those of free inputs only.
+gallery: setup-demo configure
+	@cmake --build $(BUILD) --target riffle contact_sheet
+	@bash cmake/gallery.sh $(BUILD) $(if $(DOCS),--docs)
+
+format: setup-ci
+	@clang-format -i $(FORMATTED)
+
+install: all
+	@cmake --install $(BUILD)
+
+clean:
+	@rm -rf $(BUILD)
+
+setup-%:
+	@bash cmake/setup.sh $*
