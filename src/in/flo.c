@@ -75,4 +75,4 @@ static RfResult flo_read(const RfFlowSource *source, int moment, RfFlowMoment *o
     return hole ? mask_unknown(&out->field) : RF_OK;
 }
 
-const RfFlowFormat rf_flow_format_flo = {"flo", "flo", flo_probe, flo_read};
+const RfFlowFormat rf_flow_format_flo = {.name = "flo", .extensions = "flo", .probe = flo_probe, .read = flo_read};

@@ -185,4 +185,4 @@ static RfResult npy_read(const RfFlowSource *source, int moment, RfFlowMoment *o
     return rf_npy_read(source, NULL, moment, out);
 }
 
-const RfFlowFormat rf_flow_format_npy = {"npy", "npy", rf_npy_probe, npy_read};
+const RfFlowFormat rf_flow_format_npy = {.name = "npy", .extensions = "npy", .probe = rf_npy_probe, .read = npy_read};
