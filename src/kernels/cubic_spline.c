@@ -25,13 +25,15 @@ static void filter_lines(float *line, int count, ptrdiff_t step, int lanes)
 {
     if (count < 2)
         return;
-    float power = POLE;
-    int horizon = rf_min_int(HORIZON, count - 1);
-    for (int k = 1; k <= horizon; ++k, power *= POLE)
+    for (int l = 0; l < lanes; ++l)
     {
-        const float *other = line + k * step;
-        for (int l = 0; l < lanes; ++l)
-            line[l] += power * other[l];
+        float sum = line[l], power = POLE;
+        for (int k = 1; k <= HORIZON; ++k, power *= POLE)
+        {
+            int turned = k % (2 * count - 2);
+            sum += power * line[(turned < count ? turned : 2 * count - 2 - turned) * step + l];
+        }
+        line[l] = sum;
     }
     for (int i = 1; i < count; ++i)
     {

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/memory.h"
+#include "core/random.h"
+#include "data/exemplar.h"
+#include "kernels/cubic_spline.h"
+#include "riffle/riffle.h"
+#include "support/measures.h"
+#include "support/scenes.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum
+{
+    N = 192,
+    PIXELS = N * N
+};
+
+static float g_texture[PIXELS], g_other[PIXELS], g_displacement[2 * PIXELS], g_backward[2 * PIXELS], g_frame[PIXELS];
+
+static void draw_texture(float *grey, float low, float high, uint64_t seed)
+{
+    scene_noise(N, N, low, high, seed, grey);
+    for (int k = 0; k < PIXELS; ++k)
+        grey[k] *= 255;
+}
+
+static void displace_by(SceneFlow *flow)
+{
+    SceneMoments moments = scene_moments(flow, N, N);
+    RfFlowView view = scene_step(&moments, 5);
+    measure_displacement(&view, N, N, g_displacement);
+    measure_invert(g_displacement, N, N, g_backward);
+    scene_moments_free(&moments);
+}
+
+static MeasureFlowError judge(const float *a, const float *b)
+{
+    return measure_flow_error(a, b, N, N, g_displacement, NULL, g_texture, N, N);
+}
+
+static void the_scene_is_unsteady_incompressible_and_no_faster_than_three_cells(void **state)
+{
+    (void)state;
+    float *v = g_displacement, fastest = 0, divergence = 0, change = 0;
+    for (int frame = 0; frame < 120; frame += 10)
+    {
+        memcpy(g_backward, v, sizeof g_backward);
+        scene_two_vortices(N, N, frame, v);
+        for (int y = 1; y < N - 1; ++y)
+            for (int x = 1; x < N - 1; ++x)
+            {
+                const float *p = v + 2 * (y * N + x);
+                fastest = fmaxf(fastest, hypotf(p[0], p[1]));
+                divergence = fmaxf(divergence, fabsf(p[2] - p[-2] + p[2 * N + 1] - p[-2 * N + 1]) / 2);
+                change = frame > 0 ? fmaxf(change, fabsf(p[0] - g_backward[2 * (y * N + x)])) : 0;
+            }
+    }
+    assert_true(fastest > 2 && fastest <= 3);
+    assert_true(divergence < 0.003f);
+    assert_true(change > 0.3f);
+}
+
+static void a_displacement_in_solid_rotation_is_the_rotation(void **state)
+{
+    (void)state;
+    displace_by(scene_rotation);
+    double angle = 2 * 3.14159265358979 / 120, c = cos(angle), s = sin(angle);
+    // Inside the circle that never leaves the domain, where velocities are not the border's.
+    for (int y = 30; y < N - 30; y += 7)
+        for (int x = 30; x < N - 30; x += 7)
+        {
+            double dx = x + 0.5 - N / 2.0, dy = y + 0.5 - N / 2.0;
+            const float *d = g_displacement + 2 * (y * N + x), *b = g_backward + 2 * (y * N + x);
+            assert_true(hypot((double)d[0] - (c * dx - s * dy - dx), (double)d[1] - (s * dx + c * dy - dy)) < 1e-4);
+            assert_true(hypot((double)b[0] - (c * dx + s * dy - dx), (double)b[1] - (-s * dx + c * dy - dy)) < 1e-4);
+        }
+}
+
+static void splines_go_through_their_samples_and_follow_a_sine(void **state)
+{
+    (void)state;
+    float samples[3 * 40], line[40], value;
+    for (int i = 0; i < 120; ++i)
+        samples[i] = rf_random_float(1, 0, (uint64_t)i, 0);
+    float coefficients[120];
+    memcpy(coefficients, samples, sizeof samples);
+    rf_spline_prefilter(coefficients, 10, 4, 3);
+    for (int y = 0; y < 4; ++y)
+        for (int x = 0; x < 10; ++x)
+        {
+            float values[3];
+            rf_spline_sample(coefficients, 10, 4, 3, 3, (float)x, (float)y, values);
+            for (int c = 0; c < 3; ++c)
+                assert_true(fabsf(values[c] - samples[(y * 10 + x) * 3 + c]) < 1e-5f);
+        }
+    for (int i = 0; i < 40; ++i)
+        line[i] = sinf(0.6f * (float)i);
+    rf_spline_prefilter(line, 40, 1, 1);
+    for (float x = 8; x < 32; x += 0.37f)
+    {
+        rf_spline_sample(line, 40, 1, 1, 1, x, 0, &value);
+        assert_true(fabsf(value - sinf(0.6f * x)) < 1e-3f);
+    }
+    float one = 7;
+    rf_spline_prefilter(&one, 1, 1, 1);
+    rf_spline_sample(&one, 1, 1, 1, 1, 0.3f, -5, &value);
+    assert_true(fabsf(value - 7) < 1e-5f);
+}
+
+static void check_floor(SceneFlow *flow, float low, float high, double allowed)
+{
+    draw_texture(g_texture, low, high, 3);
+    displace_by(flow);
+    measure_warp(g_texture, g_backward, N, N, g_frame);
+    MeasureFlowError e = judge(g_texture, g_frame);
+    print_message("flow floor at %.3f to %.3f cycles a pixel: %.4f px\n", (double)low, (double)high, e.floor);
+    assert_true(e.pixels > PIXELS / 2);
+    assert_true(e.floor < allowed);
+    assert_true(fabs(e.ratio - 1) < 1e-9 && fabs(e.exemplar_ratio - 1) < 1e-9);
+}
+
+static void the_flow_of_a_warped_texture_is_found_to_a_small_fraction_of_a_pixel(void **state)
+{
+    (void)state;
+    check_floor(scene_translation, 0.01f, 0.15f, 0.02);
+    check_floor(scene_rotation, 0.01f, 0.15f, 0.08);
+    check_floor(scene_two_vortices, 0.01f, 0.15f, 0.08);
+    check_floor(scene_two_vortices, 0.03f, 0.25f, 0.08);
+}
+
+static void motions_of_eight_pixels_are_found(void **state)
+{
+    (void)state;
+    draw_texture(g_texture, 0.01f, 0.15f, 3);
+    for (int k = 0; k < PIXELS; ++k)
+    {
+        g_displacement[2 * k] = 7.3f;
+        g_displacement[2 * k + 1] = -3.6f;
+    }
+    measure_invert(g_displacement, N, N, g_backward);
+    measure_warp(g_texture, g_backward, N, N, g_frame);
+    assert_true(judge(g_texture, g_frame).error < 0.05);
+}
+
+static void a_frozen_texture_and_another_texture_fail_the_flow_error(void **state)
+{
+    (void)state;
+    draw_texture(g_texture, 0.01f, 0.15f, 3);
+    draw_texture(g_other, 0.01f, 0.15f, 4);
+    displace_by(scene_two_vortices);
+    MeasureFlowError frozen = judge(g_texture, g_texture), unrelated = judge(g_texture, g_other);
+    assert_true(frozen.error > 0.5 && frozen.ratio > 10);
+    assert_true(unrelated.error > 1 && unrelated.ratio > 20);
+}
+
+static void land_does_not_count(void **state)
+{
+    (void)state;
+    static uint8_t mask[PIXELS];
+    draw_texture(g_texture, 0.01f, 0.15f, 3);
+    displace_by(scene_two_vortices);
+    measure_warp(g_texture, g_backward, N, N, g_frame);
+    // The left half is land where nothing moves.
+    for (int k = 0; k < PIXELS; ++k)
+    {
+        mask[k] = k % N >= N / 2;
+        if (k % N < N / 2 - 4)
+            g_frame[k] = g_texture[k];
+    }
+    MeasureFlowError all = judge(g_texture, g_frame);
+    MeasureFlowError fluid = measure_flow_error(g_texture, g_frame, N, N, g_displacement, mask, NULL, 0, 0);
+    assert_true(fluid.pixels < all.pixels / 2 + N);
+    assert_true(fluid.error < 0.1 && all.error > 0.3);
+}
+
+static void a_spectrum_is_at_no_distance_from_itself_and_far_from_white_noise(void **state)
+{
+    (void)state;
+    draw_texture(g_texture, 0.01f, 0.15f, 3);
+    MeasureSpectrum same = measure_spectrum(g_texture, N, N, g_texture, N, N);
+    assert_true(same.distance < 1e-9 && same.floor > 0.3 && same.floor < 4 && same.crop == N / 2);
+    draw_texture(g_other, 0.01f, 0.15f, 8);
+    MeasureSpectrum alike = measure_spectrum(g_other, N, N, g_texture, N, N);
+    assert_true(alike.ratio < 1 && alike.pair_ratio > 0.8 && alike.pair_ratio < 1.25);
+    for (int k = 0; k < PIXELS; ++k)
+        g_other[k] = 255 * rf_random_float(9, 0, (uint64_t)k, 0);
+    MeasureSpectrum white = measure_spectrum(g_other, N, N, g_texture, N, N);
+    assert_true(white.ratio > 5 && white.pair_ratio > 5);
+}
+
+static void half_the_amplitude_is_six_decibels_and_half_the_contrast(void **state)
+{
+    (void)state;
+    draw_texture(g_texture, 0.01f, 0.5f, 3);
+    for (int k = 0; k < PIXELS; ++k)
+        g_other[k] = 100 + 0.5f * (g_texture[k] - 127.5f);
+    MeasureSpectrum s = measure_spectrum(g_other, N, N, g_texture, N, N);
+    assert_true(fabs(s.distance - 6.02) < 0.1);
+    for (int k = 0; k < PIXELS; ++k)
+    {
+        g_frame[k] = g_other[k] / 255;
+        g_backward[k] = g_texture[k] / 255;
+    }
+    RfImageView frame = {g_frame, N, N, 1, N}, exemplar = {g_backward, N, N, 1, N};
+    MeasureContrast c = measure_contrast(&frame, NULL, &exemplar);
+    assert_true(fabs(c.luma - 0.5) < 0.01 && fabs(c.channel[0] - 0.5) < 0.01 && c.channels == 1);
+    assert_true(fabs(c.brightness + 27.5) < 1 && c.histogram_l1 > 0.4);
+    MeasureContrast same = measure_contrast(&exemplar, NULL, &exemplar);
+    assert_true(same.luma == 1 && same.histogram_l1 == 0 && same.histogram_mover == 0);
+}
+
+static void the_earth_movers_distance_of_a_shift_is_the_shift(void **state)
+{
+    (void)state;
+    float a[12], b[12];
+    for (int i = 0; i < 12; ++i)
+    {
+        a[i] = (float)(10 * (i / 3)) / 255;
+        b[i] = a[i] + 17.0f / 255;
+    }
+    RfImageView frame = {b, 2, 2, 3, 6}, exemplar = {a, 2, 2, 3, 6};
+    MeasureContrast c = measure_contrast(&frame, NULL, &exemplar);
+    assert_true(fabs(c.histogram_mover - 17) < 1e-3 && fabs(c.luma - 1) < 1e-3);
+}
+
+static void a_carried_frame_does_not_flicker_and_a_changed_block_pops_where_it_is(void **state)
+{
+    (void)state;
+    draw_texture(g_texture, 0.01f, 0.15f, 3);
+    displace_by(scene_two_vortices);
+    measure_warp(g_texture, g_backward, N, N, g_frame);
+    MeasureFlicker still = measure_flicker(g_texture, g_frame, N, N, g_displacement, NULL);
+    assert_true(still.whole < 1e-4 && still.pop < 1e-3);
+    assert_true(still.floor > 0 && still.floor < 0.05);
+    draw_texture(g_other, 0.01f, 0.15f, 4);
+    for (int y = 64; y < 96; ++y)
+        memcpy(g_frame + y * N + 112, g_other + y * N + 112, 32 * sizeof(float));
+    MeasureFlicker pop = measure_flicker(g_texture, g_frame, N, N, g_displacement, NULL);
+    assert_true(pop.pop_x == 112 && pop.pop_y == 64);
+    assert_true(pop.pop > 0.8 && pop.whole < 0.4 && pop.whole > 0.1);
+    MeasureFlicker frozen = measure_flicker(g_texture, g_texture, N, N, g_displacement, NULL);
+    assert_true(frozen.whole > 0.3);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_scene_is_unsteady_incompressible_and_no_faster_than_three_cells),
+        cmocka_unit_test(a_displacement_in_solid_rotation_is_the_rotation),
+        cmocka_unit_test(splines_go_through_their_samples_and_follow_a_sine),
+        cmocka_unit_test(the_flow_of_a_warped_texture_is_found_to_a_small_fraction_of_a_pixel),
+        cmocka_unit_test(motions_of_eight_pixels_are_found),
+        cmocka_unit_test(a_frozen_texture_and_another_texture_fail_the_flow_error),
+        cmocka_unit_test(land_does_not_count),
+        cmocka_unit_test(a_spectrum_is_at_no_distance_from_itself_and_far_from_white_noise),
+        cmocka_unit_test(half_the_amplitude_is_six_decibels_and_half_the_contrast),
+        cmocka_unit_test(the_earth_movers_distance_of_a_shift_is_the_shift),
+        cmocka_unit_test(a_carried_frame_does_not_flicker_and_a_changed_block_pops_where_it_is),
+    };
+    return cmocka_run_group_tests_name("measures", tests, NULL, NULL);
+}
