@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The place in an exemplar that fits best what is drawn somewhere already.
+#pragma once
+
+#include "kernels/texture.h"
+
+/// A window of a picture at a texture level's spacing, to be laid over that level.
+typedef struct RfMatchWindow
+{
+    const RfTexture *texture;
+    int level, width, height;
+    /// [quads][height][width][4]: the picture, and the weight of every number's squared difference.
+    const float *target, *weight;
+} RfMatchWindow;
+
+/// Weighted sum of squared differences with the window's first pixel on texel (x, y); wraps where the exemplar tiles,
+/// else the window must fit.
+void rf_match_cost(const RfMatchWindow *window, int x, int y, float *cost);
+
+/// Number of places (x, y) at which the window may lie: columns[0] x columns[1].
+void rf_match_places(const RfMatchWindow *window, int places[2]);
+
+typedef struct RfMatch
+{
+    int x, y;
+    float cost;
+} RfMatch;
+
+/// The `keep` best of `tries` random places (all of them in order, if there are no more), best first; ties go to the
+/// earlier try. keep <= 8. Returns how many were found.
+int rf_match_search(const RfMatchWindow *window, int tries, int keep, uint64_t seed, uint64_t frame, uint64_t item,
+                    RfMatch *best);
