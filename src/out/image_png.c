@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// PNG through libpng, 8 or 16 bit, 1 to 4 channels. Frames are written by the hundred, so speed counts more than the
+// last tenth of size: one fixed filter, a low level of compression.
+#include "out/image.h"
+
+#include "core/maths.h"
+#include "core/memory.h"
+#include "core/result.h"
+
+#include <png.h>
+
+enum
+{
+    ZLIB_LEVEL = 3
+};
+
+typedef struct PngWriting
+{
+    RfOutFile *file;
+    RfImageView view;
+    bool deep;
+    uint8_t *row;
+    RfResult result;
+    png_structp png;
+    png_infop info;
+} PngWriting;
+
+static void *png_allocate(png_structp png, png_alloc_size_t size)
+{
+    (void)png;
+    return rf_allocate(size, 1);
+}
+
+static void png_release(png_structp png, void *memory)
+{
+    (void)png;
+    rf_release(memory);
+}
+
+_Noreturn static void on_error(png_structp png, const char *message)
+{
+    PngWriting *writing = png_get_error_ptr(png);
+    if (writing->result == RF_OK)
+        writing->result = rf_fail(RF_WRITE_FAILED, writing->file->path, NULL, "cannot be written as PNG: %s", message);
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, const char *message)
+{
+    (void)png;
+    (void)message;
+}
+
+static void write_bytes(png_structp png, png_bytep data, size_t size)
+{
+    PngWriting *writing = png_get_io_ptr(png);
+    writing->result = rf_out_write(writing->file, data, size);
+    if (writing->result != RF_OK)
+        png_error(png, "write failed");
+}
+
+static void flush_nothing(png_structp png)
+{
+    (void)png;
+}
+
+static void convert_row(const PngWriting *writing, int y)
+{
+    const float *from = writing->view.pixels + (ptrdiff_t)y * writing->view.row_stride;
+    int count = writing->view.width * writing->view.channels;
+    if (writing->deep)
+    {
+        for (int i = 0; i < count; ++i)
+        {
+            uint32_t value = (uint32_t)(rf_clamp(from[i], 0, 1) * 65535.0f + 0.5f);
+            writing->row[2 * i] = (uint8_t)(value >> 8);
+            writing->row[2 * i + 1] = (uint8_t)value;
+        }
+    }
+    else
+    {
+        for (int i = 0; i < count; ++i)
+            writing->row[i] = (uint8_t)(rf_clamp(from[i], 0, 1) * 255.0f + 0.5f);
+    }
+}
+
+static void encode_guarded(PngWriting *writing)
+{
+    static const int colour_types[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
+                                       PNG_COLOR_TYPE_RGB_ALPHA};
+    if (setjmp(png_jmpbuf(writing->png)) != 0)
+        return;
+    RfImageView view = writing->view;
+    png_set_write_fn(writing->png, writing, write_bytes, flush_nothing);
+    png_set_compression_level(writing->png, ZLIB_LEVEL);
+    png_set_filter(writing->png, 0, PNG_FILTER_SUB);
+    png_set_IHDR(writing->png, writing->info, (png_uint_32)view.width, (png_uint_32)view.height, writing->deep ? 16 : 8,
+                 colour_types[view.channels - 1], PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    png_write_info(writing->png, writing->info);
+    for (int y = 0; y < view.height; ++y)
+    {
+        convert_row(writing, y);
+        png_write_row(writing->png, writing->row);
+    }
+    png_write_end(writing->png, NULL);
+}
+
+static RfResult encode_png(RfOutFile *file, const RfImage *image)
+{
+    PngWriting writing = {.file = file, .view = rf_image_view(image)};
+    if (writing.view.channels > 4)
+        return rf_fail(RF_UNSUPPORTED, file->path, NULL, "%d channels do not fit a PNG, which has 1 to 4: write .exr",
+                       writing.view.channels);
+    writing.deep = rf_image_format(image) != RF_SAMPLE_U8;
+    writing.png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &writing, on_error, on_warning, NULL, png_allocate,
+                                            png_release);
+    writing.info = writing.png ? png_create_info_struct(writing.png) : NULL;
+    writing.row = rf_allocate((size_t)writing.view.width, (size_t)writing.view.channels * 2);
+    if (writing.info && writing.row)
+        encode_guarded(&writing);
+    else
+        writing.result = RF_OUT_OF_MEMORY;
+    png_destroy_write_struct(&writing.png, &writing.info);
+    rf_release(writing.row);
+    return writing.result;
+}
+
+const RfImageWriter rf_png_writer = {"png", encode_png};
