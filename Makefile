@@ -3,7 +3,7 @@
 BUILD := build
 FORMATTED = $(shell git ls-files '*.c' '*.h')
 
-.PHONY: all demo test bench gallery format install clean setup-% configure
+.PHONY: all demo test bench gallery docs format install clean setup-% configure
 
 all: setup-build configure
 	@cmake --build $(BUILD) --target riffle riffle_static riffle_shared
@@ -32,6 +32,11 @@ bench: setup-test configure
 gallery: setup-demo configure
 	@cmake --build $(BUILD) --target riffle contact_sheet
 	@bash cmake/gallery.sh $(BUILD) $(if $(DOCS),--docs)
+
+# The tables of options and built-in inputs in docs/, from the program.
+docs: setup-build configure
+	@cmake --build $(BUILD) --target options
+	@bash cmake/doc_tables.sh $(BUILD)/examples/options --write
 
 format: setup-ci
 	@clang-format -i $(FORMATTED)

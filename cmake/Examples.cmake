@@ -14,4 +14,6 @@ if(BUILD_TESTING)
            COMMAND bash ${CMAKE_SOURCE_DIR}/tests/install/compare_readme.sh ${CMAKE_SOURCE_DIR})
   file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/examples/frames)
   add_test(NAME the_example_of_the_readme_runs COMMAND texture WORKING_DIRECTORY ${CMAKE_BINARY_DIR}/examples/frames)
+  add_test(NAME the_tables_in_the_docs_are_what_the_program_says
+           COMMAND bash ${CMAKE_SOURCE_DIR}/cmake/doc_tables.sh $<TARGET_FILE:options>)
 endif()
