@@ -9,7 +9,8 @@
 #include <string.h>
 
 static const RfSceneClass *const scenes[] = {
-    &rf_scene_vortex, &rf_scene_shear, &rf_scene_gyre, &rf_scene_uniform, &rf_scene_rotation,
+    &rf_scene_vortex,   &rf_scene_shear,      &rf_scene_gyre,     &rf_scene_uniform,
+    &rf_scene_rotation, &rf_scene_turbulence, &rf_scene_cylinder, &rf_scene_river,
 };
 
 static const RfExemplarClass *const exemplars[] = {

@@ -2,8 +2,9 @@
 // Two plain exemplars: noise for shaders and measurements, and a checker that shows every distortion.
 //
 // The noise is Gaussian with a chosen spectrum, made in the Fourier domain, so it tiles and has no lattice: amplitude
-// falls as 1 / k (each octave of wavelengths adds as much variance) between a quarter of the shorter side and
-// 3 pixels, with soft ends. It is then squeezed a little at its tails so that it stays inside 0..1 without clipping.
+// falls as 1 / k^1.5 (each octave of wavelengths has half the variance of the one above) from a quarter of the shorter
+// side to 3 pixels, with soft ends. It is then squeezed a little at its tails so that it stays inside 0..1 without
+// clipping.
 #include "core/maths.h"
 #include "core/memory.h"
 #include "core/random.h"
@@ -26,7 +27,7 @@ static float noise_amplitude(float k, float low, float high)
     float rise = k / low, fall = k / high;
     rise = rise * rise * rise * rise;
     fall = fall * fall * fall * fall;
-    return rise / (1 + rise) / (1 + fall) / k;
+    return rise / (1 + rise) / (1 + fall) / (k * sqrtf(k));
 }
 
 /// White noise times the amplitude, in place; returns nothing but the filtered field's real part.
