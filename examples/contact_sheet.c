@@ -99,28 +99,37 @@ static double common_step(const Sheet *sheet)
     return (double)widest / sheet->cell;
 }
 
-/// Height of the highest picture of a row.
-static int row_height(const Sheet *sheet, int row, double step)
+/// The widest picture of a column, or the highest of a row.
+static int extent(const Sheet *sheet, bool of_column, int index, double step)
 {
-    int height = 1;
-    for (int i = row * sheet->columns; i < (row + 1) * sheet->columns && i < sheet->count; ++i)
+    int most = 1;
+    for (int i = 0; i < sheet->count; ++i)
     {
-        int own = sheet->pictures[i] ? shrunk(rf_image_view(sheet->pictures[i]).height, step) : 0;
-        height = own > height ? own : height;
+        if (!sheet->pictures[i] || (of_column ? i % sheet->columns : i / sheet->columns) != index)
+            continue;
+        RfImageView view = rf_image_view(sheet->pictures[i]);
+        int own = shrunk(of_column ? view.width : view.height, step);
+        most = own > most ? own : most;
     }
-    return height;
+    return most;
+}
+
+/// Where column or row `index` begins; for the number of them, where the sheet ends.
+static int start(const Sheet *sheet, bool of_column, int index, double step)
+{
+    int at = MARGIN;
+    for (int i = 0; i < index; ++i)
+        at += extent(sheet, of_column, i, step) + MARGIN;
+    return at;
 }
 
 static RfResult lay_out(const Sheet *sheet)
 {
     double step = common_step(sheet);
-    int rows = (sheet->count + sheet->columns - 1) / sheet->columns;
-    int height = MARGIN;
-    for (int row = 0; row < rows; ++row)
-        height += row_height(sheet, row, step) + MARGIN;
-
+    int columns = sheet->columns < sheet->count ? sheet->columns : sheet->count;
+    int rows = (sheet->count + columns - 1) / columns;
     RfImage *image = NULL;
-    RfResult result = rf_image_create(MARGIN + sheet->columns * (sheet->cell + MARGIN), height, 3, &image);
+    RfResult result = rf_image_create(start(sheet, true, columns, step), start(sheet, false, rows, step), 3, &image);
     if (result != RF_OK)
         return result;
     rf_image_set_origin(image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
@@ -129,15 +138,10 @@ static RfResult lay_out(const Sheet *sheet)
         for (int x = 0; x < view.width * 3; ++x)
             view.pixels[y * view.row_stride + x] = BACKGROUND;
 
-    int top = MARGIN;
-    for (int row = 0; row < rows; ++row)
-    {
-        for (int column = 0; column < sheet->columns && row * sheet->columns + column < sheet->count; ++column)
-            if (sheet->pictures[row * sheet->columns + column])
-                draw(sheet->pictures[row * sheet->columns + column], view, MARGIN + column * (sheet->cell + MARGIN),
-                     top, step);
-        top += row_height(sheet, row, step) + MARGIN;
-    }
+    for (int i = 0; i < sheet->count; ++i)
+        if (sheet->pictures[i])
+            draw(sheet->pictures[i], view, start(sheet, true, i % sheet->columns, step),
+                 start(sheet, false, i / sheet->columns, step), step);
     result = rf_image_write(sheet->output, image);
     rf_image_destroy(image);
     return result;
