@@ -221,10 +221,20 @@ static RfResult open_directory(RfFlow *flow)
                    "the directory holds no 2D flow: looked for flo, npy, exr, vti, vec, txt and png files");
 }
 
-static RfResult open_container_or_single(RfFlow *flow)
+static RfResult open_single(RfFlow *flow)
 {
     RF_TRY(find_format(flow, flow->path));
-    return flow->format->by_path ? RF_OK : rf_bytes_read(flow->path, 0, &flow->bytes);
+    if (flow->format->by_path)
+        return RF_OK;
+    RF_TRY(rf_bytes_read(flow->path, 0, &flow->bytes));
+    if (!flow->format->unpack)
+        return RF_OK;
+    RfFlowSource source = {flow->path, flow->bytes.data, flow->bytes.size, &flow->options};
+    RfBytes unpacked;
+    RF_TRY(flow->format->unpack(&source, &unpacked));
+    rf_bytes_free(&flow->bytes);
+    flow->bytes = unpacked;
+    return RF_OK;
 }
 
 static RfResult open_source(RfFlow *flow)
@@ -235,7 +245,7 @@ static RfResult open_source(RfFlow *flow)
     if (is_directory(flow->path))
         return open_directory(flow);
     if (is_file(flow->path))
-        return open_container_or_single(flow);
+        return open_single(flow);
     return rf_sequence_open(flow->path, NULL, &flow->sequence);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // OpenEXR: two channels of an image, in cells a frame, y down. Renderers and compositors name them differently.
 #include "in/flow_format.h"
+#include "in/image.h"
 
 #include "core/result.h"
 
@@ -77,11 +78,10 @@ static RfResult exr_read(const RfFlowSource *source, int moment, RfFlowMoment *o
 {
     (void)moment;
     RfImage *image;
-    RF_TRY(rf_image_read(source->path, &image));
+    RF_TRY(rf_image_decode(source->path, source->bytes, source->size, &image));
     RfResult result = take_channels(source, image, out);
     rf_image_destroy(image);
     return result;
 }
 
-const RfFlowFormat rf_flow_format_exr = {
-    .name = "exr", .extensions = "exr", .probe = exr_probe, .read = exr_read, .by_path = true};
+const RfFlowFormat rf_flow_format_exr = {.name = "exr", .extensions = "exr", .probe = exr_probe, .read = exr_read};

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "data/flow_field.h"
+#include "in/file.h"
 #include "riffle/io.h"
 
 /// A file that was read, before anything is known about it.
@@ -35,6 +36,9 @@ typedef struct RfFlowFormat
     bool (*probe)(const uint8_t *bytes, size_t size);
     /// On failure `out` holds nothing that needs freeing. A moment past the last is the caller's mistake.
     RfResult (*read)(const RfFlowSource *source, int moment, RfFlowMoment *out);
+    /// Where a moment lies packed with the others: unpacks them all into bytes that `read` takes as well, so that
+    /// opening a container does it once. NULL where a moment can be got at.
+    RfResult (*unpack)(const RfFlowSource *source, RfBytes *out);
     /// Its library opens the file by its path: `bytes` may be NULL, and the whole file is never read into memory.
     bool by_path;
 } RfFlowFormat;

@@ -10,8 +10,8 @@
 
 // Formats with a signature stand before those without, and the plainest text last.
 static const RfFlowFormat *const formats[] = {
-    &rf_flow_format_flo, &rf_flow_format_npy, &rf_flow_format_exr,
-    &rf_flow_format_png, &rf_flow_format_vec, &rf_flow_format_openpiv,
+    &rf_flow_format_flo, &rf_flow_format_npy,    &rf_flow_format_npz, &rf_flow_format_exr,     &rf_flow_format_png,
+    &rf_flow_format_vti, &rf_flow_format_netcdf, &rf_flow_format_vec, &rf_flow_format_openpiv,
 };
 
 static const char *const directory_extensions[] = {"flo", "npy", "exr", "vti", "vec", "txt", "png"};

@@ -2,6 +2,7 @@
 // Wind and currents as web maps carry them: a PNG whose red is the eastward and whose green the northward speed, beside
 // a JSON of its name with uMin, uMax, vMin and vMax, the speeds of 0 and of full. Rows run north to south.
 #include "in/flow_format.h"
+#include "in/image.h"
 #include "in/json.h"
 
 #include "core/result.h"
@@ -83,12 +84,11 @@ static RfResult png_read(const RfFlowSource *source, int moment, RfFlowMoment *o
     WindRange range;
     RfImage *image;
     RF_TRY(open_range(source, &range));
-    RF_TRY(rf_image_read(source->path, &image));
+    RF_TRY(rf_image_decode(source->path, source->bytes, source->size, &image));
     RfImageView view = rf_image_view(image);
     RfResult result = take_pixels(source, &view, &range, out);
     rf_image_destroy(image);
     return result;
 }
 
-const RfFlowFormat rf_flow_format_png = {
-    .name = "png", .extensions = "png", .probe = png_probe, .read = png_read, .by_path = true};
+const RfFlowFormat rf_flow_format_png = {.name = "png", .extensions = "png", .probe = png_probe, .read = png_read};

@@ -119,22 +119,30 @@ RfResult rf_npy_header(const RfFlowSource *source, const char *place, RfNpyHeade
     return parse_literal(source, place, text, out);
 }
 
-// The shape as [moments, height, width, 2].
-static RfResult flow_shape(const RfFlowSource *source, const char *place, const RfNpyHeader *header, uint64_t shape[4])
+static RfResult wrong_shape(const RfFlowSource *source, const char *place, const RfNpyHeader *header, int components)
 {
-    int n = header->dimension_count;
-    if ((n != 3 && n != 4) || header->shape[n - 1] != 2)
-    {
-        char text[128] = "";
-        for (int i = 0; i < n; ++i)
-            snprintf(text + strlen(text), sizeof text - strlen(text), "%s%llu", i ? ", " : "",
-                     (unsigned long long)header->shape[i]);
-        return rf_fail(RF_BAD_INPUT, source->path, place,
-                       "the shape is [%s]: a flow has [height, width, 2] or [moments, height, width, 2]", text);
-    }
-    shape[0] = n == 4 ? header->shape[0] : 1;
-    for (int i = 1; i < 4; ++i)
-        shape[i] = header->shape[n - 4 + i];
+    char text[192] = "";
+    for (int i = 0; i < header->dimension_count; ++i)
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%s%llu", i ? ", " : "",
+                 (unsigned long long)header->shape[i]);
+    return rf_fail(RF_BAD_INPUT, source->path, place,
+                   "the shape is [%s]: a %s has [height, width%s] or [moments, "
+                   "height, width%s]",
+                   text, components == 2 ? "flow" : "component", components == 2 ? ", 2" : "",
+                   components == 2 ? ", 2" : "");
+}
+
+RfResult rf_npy_shape(const RfFlowSource *source, const char *place, const RfNpyHeader *header, int components,
+                      uint64_t shape[4])
+{
+    place = place ? place : "header";
+    int n = header->dimension_count - (components == 2);
+    if ((n != 2 && n != 3) || (components == 2 && header->shape[n] != 2))
+        return wrong_shape(source, place, header, components);
+    shape[0] = n == 3 ? header->shape[0] : 1;
+    shape[1] = header->shape[n - 2];
+    shape[2] = header->shape[n - 1];
+    shape[3] = (uint64_t)components;
     if (shape[0] < 1 || shape[0] > 1000000 || shape[1] < 1 || shape[1] > RF_MAX_SIZE || shape[2] < 1 ||
         shape[2] > RF_MAX_SIZE)
         return rf_fail(RF_BAD_INPUT, source->path, place,
@@ -142,47 +150,43 @@ static RfResult flow_shape(const RfFlowSource *source, const char *place, const 
                        (unsigned long long)shape[0], (unsigned long long)shape[2], (unsigned long long)shape[1],
                        RF_MAX_SIZE);
     // At most 2^20 * 2^15 * 2^15 * 2 * 8 = 2^54 bytes: no overflow.
-    uint64_t wanted = shape[0] * shape[1] * shape[2] * 2 * (uint64_t)rf_number_size(header->kind);
+    uint64_t wanted = shape[0] * shape[1] * shape[2] * shape[3] * (uint64_t)rf_number_size(header->kind);
     if (wanted > source->size - header->data_offset)
         return rf_fail(RF_BAD_INPUT, source->path, place, "the shape needs %llu bytes of numbers, %zu are there",
                        (unsigned long long)wanted, source->size - header->data_offset);
     return RF_OK;
 }
 
-static void copy_moment(const RfFlowSource *source, const RfNpyHeader *header, const uint64_t shape[4], uint64_t moment,
-                        float *velocity)
+void rf_npy_copy(const RfFlowSource *source, const RfNpyHeader *header, const uint64_t shape[4], uint64_t moment,
+                 size_t step, float *out)
 {
-    size_t stride[4] = {0}, step = (size_t)rf_number_size(header->kind);
+    size_t stride[4] = {0}, bytes = (size_t)rf_number_size(header->kind);
     for (int i = 0; i < 4; ++i)
     {
         int axis = header->fortran_order ? i : 3 - i;
-        stride[axis] = step;
-        step *= (size_t)shape[axis];
+        stride[axis] = bytes;
+        bytes *= (size_t)shape[axis];
     }
     const uint8_t *base = source->bytes + header->data_offset + moment * stride[0];
     for (size_t y = 0; y < shape[1]; ++y)
-        for (size_t x = 0; x < shape[2]; ++x)
-            for (size_t c = 0; c < 2; ++c)
-                *velocity++ = (float)rf_load_number(base + y * stride[1] + x * stride[2] + c * stride[3], header->kind,
-                                                    header->big_endian);
+        for (size_t x = 0; x < shape[2]; ++x, out += step)
+            for (size_t c = 0; c < shape[3]; ++c)
+                out[c] = (float)rf_load_number(base + y * stride[1] + x * stride[2] + c * stride[3], header->kind,
+                                               header->big_endian);
 }
 
-RfResult rf_npy_read(const RfFlowSource *source, const char *place, int moment, RfFlowMoment *out)
+RfResult rf_npy_read(const RfFlowSource *source, int moment, RfFlowMoment *out)
 {
     RfNpyHeader header;
     uint64_t shape[4];
-    RF_TRY(rf_npy_header(source, place, &header));
-    RF_TRY(flow_shape(source, place ? place : "header", &header, shape));
+    RF_TRY(rf_npy_header(source, NULL, &header));
+    RF_TRY(rf_npy_shape(source, NULL, &header, 2, shape));
     RF_TRY(rf_flow_moment_create(source, (int64_t)shape[2], (int64_t)shape[1], out));
-    copy_moment(source, &header, shape, (uint64_t)moment, out->field.velocity);
+    rf_npy_copy(source, &header, shape, (uint64_t)moment, 2, out->field.velocity);
     out->moment_count = (int)shape[0];
     snprintf(out->conventions, sizeof out->conventions, "cells a frame, y down, as in the file");
     return RF_OK;
 }
 
-static RfResult npy_read(const RfFlowSource *source, int moment, RfFlowMoment *out)
-{
-    return rf_npy_read(source, NULL, moment, out);
-}
-
-const RfFlowFormat rf_flow_format_npy = {.name = "npy", .extensions = "npy", .probe = rf_npy_probe, .read = npy_read};
+const RfFlowFormat rf_flow_format_npy = {
+    .name = "npy", .extensions = "npy", .probe = rf_npy_probe, .read = rf_npy_read};
