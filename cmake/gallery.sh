@@ -66,6 +66,29 @@ sheet() {
     fi
 }
 
+# Clouds over built-in turbulence, from above and as a relief: the blended noise is the height, the shader's colours lie
+# on it.
+clouds() {
+    local folder=$out/clouds flow="builtin:turbulence?size=512x512" n
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    echo clouds
+    "$riffle" texture "$flow" builtin:noise "$folder/height.%04d.png" --frames 1-96 --progress none
+    "$riffle" texture "$flow" builtin:noise "$folder/frame.%04d.png" --frames 1-96 --progress none --shader clouds
+    "$riffle" render "$folder/frame.%04d.png" "$folder/relief.%04d.png" --as relief \
+        --map "height=$folder/height.%04d.png" --displace 0.15 --progress none
+    local cells=(builtin:noise)
+    for n in 0001 0032 0064 0096; do
+        cells+=("$folder/frame.$n.png")
+    done
+    cells+=(-)
+    for n in 0001 0032 0064 0096; do
+        cells+=("$folder/relief.$n.png")
+    done
+    "$build/examples/contact_sheet" "$out/clouds.png" --columns 5 --cell 256 "${cells[@]}"
+    [ "$docs" != --docs ] || publish clouds
+}
+
 flows=$data/flows2d
 exemplars=$data/exemplars
 wind=(--velocity-scale 0.04 --moment-every 24 --size 720x360)
@@ -77,6 +100,7 @@ sheet river-foam free "builtin:river?size=512x512" builtin:foam 96
 sheet cylinder-lava free "builtin:cylinder?size=512x256" builtin:lava 96
 sheet gyre-pebbles free "builtin:gyre?size=512x256" builtin:pebbles 96
 sheet turbulence-bubbles free "builtin:turbulence?size=512x512" builtin:bubbles 96
+clouds
 
 # Real flows: wind (public domain, ISC), particle image velocimetry (BSD), a slice of turbulence (MIT).
 for flow in wind:gfs_wind piv:pivpy_day2 turbulence:example_data_HIT.nc; do
