@@ -14,9 +14,7 @@ static const RfSceneClass *const scenes[] = {
 };
 
 static const RfExemplarClass *const exemplars[] = {
-    &rf_exemplar_pebbles,
-    &rf_exemplar_noise,
-    &rf_exemplar_checker,
+    &rf_exemplar_bubbles, &rf_exemplar_lava, &rf_exemplar_pebbles, &rf_exemplar_noise, &rf_exemplar_checker,
 };
 
 enum

@@ -21,6 +21,9 @@ enum
     SIZES = 24
 };
 
+// A cell's corners are rounded over this part of its radius at the most: it would lose its middle.
+static const float most_rounding = 0.22f;
+
 struct RfCells
 {
     RfTorus torus;
@@ -166,6 +169,7 @@ RfCellHit rf_cells_at(const RfCells *cells, float x, float y, float rounding)
     }
     RfCellHit hit = {near[best], -1, dx[best], dy[best], cells->cells[near[best]].radius, 1e9f, 0};
     float sum = 0;
+    rounding = fminf(rounding, most_rounding * hit.radius);
     for (int k = 0; k < count; ++k)
     {
         float ax = dx[k] - dx[best], ay = dy[k] - dy[best], apart = sqrtf(ax * ax + ay * ay);

@@ -26,5 +26,5 @@ typedef struct RfCellHit
 RfResult rf_cells_create(const RfTorus *torus, float large, float small, float evenness, float packing, uint64_t stream,
                          RfCells **out);
 void rf_cells_destroy(RfCells *cells);
-/// The cell of a point. Corners are rounded over about `rounding`.
+/// The cell of a point. Corners are rounded over about `rounding`, less in small cells.
 RfCellHit rf_cells_at(const RfCells *cells, float x, float y, float rounding);

@@ -65,15 +65,18 @@ void rf_paint(const RfTorus *torus, const RfImageView *image, RfPaintFn *paint, 
     rf_parallel_for(image->height, paint_row, &canvas);
 }
 
-/// Dot product of a lattice point's random direction with the way from it to the point.
-static float lattice_slope(const RfTorus *torus, int i, int j, float s, float t, uint64_t stream)
+/// Dot product of a lattice point's random direction, one of sixteen, with the way from it to the point.
+static inline float lattice_slope(uint64_t key, int i, int j, float s, float t)
 {
-    float angle = 2 * RF_PI * rf_random_float(torus->seed, stream, ((uint64_t)(uint32_t)j << 32) | (uint32_t)i, 0);
-    return cosf(angle) * s + sinf(angle) * t;
+    static const float ways[16] = {1,  0.92388f,  0.70711f,  0.38268f,  0, -0.38268f, -0.70711f, -0.92388f,
+                                   -1, -0.92388f, -0.70711f, -0.38268f, 0, 0.38268f,  0.70711f,  0.92388f};
+    uint64_t way = rf_hash64(key ^ (((uint64_t)(uint32_t)j << 32) | (uint32_t)i)) >> 60;
+    return ways[way] * s + ways[(way + 12) & 15] * t;
 }
 
 float rf_torus_noise(const RfTorus *torus, float x, float y, float cells, uint64_t stream)
 {
+    uint64_t key = rf_hash64(torus->seed ^ (stream << 32));
     int columns = rf_max_int(1, (int)lroundf(cells * torus->span_x));
     int rows = rf_max_int(1, (int)lroundf(cells * torus->span_y));
     float u = x / torus->span_x * (float)columns, v = y / torus->span_y * (float)rows;
@@ -81,10 +84,8 @@ float rf_torus_noise(const RfTorus *torus, float x, float y, float cells, uint64
     int i0 = rf_wrap_int((int)fu, columns), i1 = i0 + 1 < columns ? i0 + 1 : 0;
     int j0 = rf_wrap_int((int)fv, rows), j1 = j0 + 1 < rows ? j0 + 1 : 0;
     float fade_s = s * s * s * (s * (s * 6 - 15) + 10), fade_t = t * t * t * (t * (t * 6 - 15) + 10);
-    float top =
-        rf_lerp(lattice_slope(torus, i0, j0, s, t, stream), lattice_slope(torus, i1, j0, s - 1, t, stream), fade_s);
-    float bottom = rf_lerp(lattice_slope(torus, i0, j1, s, t - 1, stream),
-                           lattice_slope(torus, i1, j1, s - 1, t - 1, stream), fade_s);
+    float top = rf_lerp(lattice_slope(key, i0, j0, s, t), lattice_slope(key, i1, j0, s - 1, t), fade_s);
+    float bottom = rf_lerp(lattice_slope(key, i0, j1, s, t - 1), lattice_slope(key, i1, j1, s - 1, t - 1), fade_s);
     return 1.5f * rf_lerp(top, bottom, fade_t);
 }
 

@@ -17,7 +17,7 @@ typedef struct Layer
 
 // Of the shorter side. The lowest layer has no gaps to fall through.
 static const Layer layers[LAYERS] = {
-    {0.088f, 0.034f, 0.0052f, 1}, {0.040f, 0.018f, 0.003f, 0.72f}, {0.022f, 0.012f, 0, 0.5f}};
+    {0.105f, 0.040f, 0.006f, 1}, {0.045f, 0.020f, 0.0033f, 0.72f}, {0.025f, 0.014f, 0, 0.5f}};
 
 typedef struct Pebbles
 {
@@ -40,7 +40,7 @@ static RfCellHit find(const Pebbles *pebbles, int layer, float x, float y)
     float bend = 0.010f, cells = 11;
     float bx = x + bend * rf_torus_noise(&pebbles->torus, x, y, cells, 40),
           by = y + bend * rf_torus_noise(&pebbles->torus, x, y, cells, 41);
-    return rf_cells_at(pebbles->cells[layer], bx, by, layers[layer].small * 0.32f);
+    return rf_cells_at(pebbles->cells[layer], bx, by, 1);
 }
 
 /// Colour of the stone itself.
