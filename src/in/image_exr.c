@@ -2,8 +2,11 @@
 // OpenEXR through OpenEXRCore: scanlines and tiles (the finest level), half, float and unsigned channels of any name,
 // every compression the library has. Of a file with several parts the first is read; the image is the data window.
 //
-// The library reads through callbacks from the bytes in memory, and unpacks each chunk straight to its place in the
-// interleaved float image.
+// The library reads through callbacks from the bytes in memory and decompresses a chunk; spreading the chunk's samples
+// over the interleaved float image is done here, because OpenEXRCore 3.1.5 mixes up the channels when it turns three or
+// four interleaved half channels to float. A decompressed chunk is little endian and lies as
+//
+//   row 0: channel 0 [width] | channel 1 [width] | ...    row 1: channel 0 [width] | ...
 #include "in/image.h"
 
 #include "core/memory.h"
@@ -33,6 +36,8 @@ typedef struct ExrReading
     RfImage *image;
     // Channel of the image for each channel of the file.
     int order[RF_MAX_CHANNELS];
+    // Where in the image the chunk at hand begins.
+    int x, y;
 } ExrReading;
 
 static void *exr_allocate(size_t size)
@@ -181,25 +186,70 @@ static RfResult make_image(ExrReading *reading, exr_storage_t *storage)
     return RF_OK;
 }
 
-// Points the pipeline's channels at the chunk's first pixel in the image.
-static void aim(const ExrReading *reading, exr_decode_pipeline_t *pipeline, int x, int y)
+static float half_to_float(uint16_t half)
 {
-    RfImageView view = rf_image_view(reading->image);
-    for (int i = 0; i < pipeline->channel_count; ++i)
+    uint32_t sign = (uint32_t)(half & 0x8000) << 16, exponent = half >> 10 & 31, mantissa = half & 1023;
+    float value = (float)mantissa * 0x1p-24f;
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    if (exponent > 0)
+        bits = (exponent == 31 ? 255u : exponent + 112) << 23 | mantissa << 13;
+    bits |= sign;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+// One channel of one row, from the file's samples to every `stride`-th float.
+static void spread(const uint8_t *from, int type, int width, float *to, int stride)
+{
+    for (int x = 0; x < width; ++x, to += stride)
     {
-        exr_coding_channel_info_t *channel = &pipeline->channels[i];
-        float *first = view.pixels + (ptrdiff_t)y * view.row_stride + (ptrdiff_t)x * view.channels + reading->order[i];
-        channel->decode_to_ptr = (uint8_t *)first;
-        channel->user_data_type = EXR_PIXEL_FLOAT;
-        channel->user_bytes_per_element = sizeof(float);
-        channel->user_pixel_stride = view.channels * (int32_t)sizeof(float);
-        channel->user_line_stride = (int32_t)view.row_stride * (int32_t)sizeof(float);
+        uint16_t half;
+        uint32_t number;
+        if (type == EXR_PIXEL_HALF)
+        {
+            memcpy(&half, from + 2 * (size_t)x, 2);
+            *to = half_to_float(half);
+        }
+        else if (type == EXR_PIXEL_FLOAT)
+            memcpy(to, from + 4 * (size_t)x, 4);
+        else
+        {
+            memcpy(&number, from + 4 * (size_t)x, 4);
+            *to = (float)number;
+        }
     }
 }
 
+// The pipeline's last stage.
+static exr_result_t unpack(exr_decode_pipeline_t *pipeline)
+{
+    const ExrReading *reading = pipeline->decoding_user_data;
+    RfImageView view = rf_image_view(reading->image);
+    const uint8_t *from = pipeline->unpacked_buffer;
+    int width = pipeline->chunk.width, height = pipeline->chunk.height;
+    size_t pixel_bytes = 0;
+    for (int c = 0; c < pipeline->channel_count; ++c)
+        pixel_bytes += (size_t)pipeline->channels[c].bytes_per_element;
+    if (!from || pipeline->chunk.unpacked_size < (size_t)width * (size_t)height * pixel_bytes)
+        return EXR_ERR_CORRUPT_CHUNK;
+    for (int y = 0; y < height; ++y)
+    {
+        float *row =
+            view.pixels + (ptrdiff_t)(reading->y + y) * view.row_stride + (ptrdiff_t)reading->x * view.channels;
+        for (int c = 0; c < pipeline->channel_count; ++c)
+        {
+            const exr_coding_channel_info_t *channel = &pipeline->channels[c];
+            spread(from, channel->data_type, width, row + reading->order[c], view.channels);
+            from += (size_t)width * (size_t)channel->bytes_per_element;
+        }
+    }
+    return EXR_ERR_SUCCESS;
+}
+
 // A chunk whose sizes disagree with the image would be written outside it.
-static exr_result_t decode_chunk(const ExrReading *reading, exr_decode_pipeline_t *pipeline, exr_chunk_info_t *chunk,
-                                 int x, int y)
+static exr_result_t decode_chunk(ExrReading *reading, exr_decode_pipeline_t *pipeline, exr_chunk_info_t *chunk, int x,
+                                 int y)
 {
     RfImageView view = rf_image_view(reading->image);
     if (chunk->width < 1 || chunk->height < 1 || x < 0 || y < 0 || chunk->width > view.width - x ||
@@ -210,9 +260,12 @@ static exr_result_t decode_chunk(const ExrReading *reading, exr_decode_pipeline_
                               : exr_decoding_update(reading->context, 0, chunk, pipeline);
     if (code != EXR_ERR_SUCCESS)
         return code;
-    aim(reading, pipeline, x, y);
+    reading->x = x;
+    reading->y = y;
+    pipeline->decoding_user_data = reading;
     if (fresh)
         code = exr_decoding_choose_default_routines(reading->context, 0, pipeline);
+    pipeline->unpack_and_convert_fn = unpack;
     return code == EXR_ERR_SUCCESS ? exr_decoding_run(reading->context, 0, pipeline) : code;
 }
 
