@@ -87,7 +87,7 @@ void *rf_arena_push(RfArena *arena, size_t count, size_t size)
                 count, size);
         return NULL;
     }
-    bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    bytes = bytes > 0 ? (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT : ALIGNMENT;
     arena->wanted += bytes;
     if (arena->capacity - arena->used >= bytes)
     {

@@ -60,8 +60,10 @@ RF_WIDE(rf_match_cost, (const RfMatchWindow *window, int x, int y, float *cost),
 void rf_match_places(const RfMatchWindow *window, int places[2])
 {
     const RfTextureLevel *level = &window->texture->levels[window->level];
-    places[0] = window->texture->tiles ? level->width : rf_max_int(level->width - window->width + 1, 0);
-    places[1] = window->texture->tiles ? level->height : rf_max_int(level->height - window->height + 1, 0);
+    places[0] =
+        window->texture->tiles ? level->width : rf_max_int(level->width - window->width - 2 * window->margin + 1, 0);
+    places[1] =
+        window->texture->tiles ? level->height : rf_max_int(level->height - window->height - 2 * window->margin + 1, 0);
 }
 
 typedef struct Search
@@ -97,7 +99,8 @@ static void search_chunk(void *context, int chunk, int worker)
         if (!search->all)
             place = rf_random_below((uint32_t)(search->places[0] * search->places[1]), search->seed, search->frame,
                                     search->item, (uint64_t)i + 16);
-        RfMatch match = {(int)place % search->places[0], (int)place / search->places[0], 0};
+        int margin = search->window->texture->tiles ? 0 : search->window->margin;
+        RfMatch match = {(int)place % search->places[0] + margin, (int)place / search->places[0] + margin, 0};
         rf_match_cost(search->window, match.x, match.y, &match.cost);
         insert_match(best, search->keep, match);
     }

@@ -9,6 +9,8 @@ typedef struct RfMatchWindow
 {
     const RfTexture *texture;
     int level, width, height;
+    /// Texels that must stay free round the window in an exemplar that does not tile.
+    int margin;
     /// [quads][height][width][4]: the picture, and the weight of every number's squared difference.
     const float *target, *weight;
 } RfMatchWindow;
@@ -17,7 +19,7 @@ typedef struct RfMatchWindow
 /// else the window must fit.
 void rf_match_cost(const RfMatchWindow *window, int x, int y, float *cost);
 
-/// Number of places (x, y) at which the window may lie: columns[0] x columns[1].
+/// Number of places at which the window may lie, along x and y.
 void rf_match_places(const RfMatchWindow *window, int places[2]);
 
 typedef struct RfMatch

@@ -132,6 +132,16 @@ static void fill_inverse(const Ranked *ranked, size_t count, float *table)
     }
 }
 
+static float ranked_variance(const Ranked *ranked, size_t count)
+{
+    double mean = 0, sum = 0;
+    for (size_t i = 0; i < count; ++i)
+        mean += (double)ranked[i].value / (double)count;
+    for (size_t i = 0; i < count; ++i)
+        sum += ((double)ranked[i].value - mean) * ((double)ranked[i].value - mean) / (double)count;
+    return (float)sum;
+}
+
 static float *table_of(const RfHistogram *histogram, int level, int channel)
 {
     return histogram->inverse + (size_t)(level * histogram->channels + channel) * RF_INVERSE_SIZE;
@@ -140,7 +150,7 @@ static float *table_of(const RfHistogram *histogram, int level, int channel)
 RfResult rf_histogram_create(float *pixels, size_t count, size_t stride, int channels, RfHistogram *out)
 {
     assert(channels >= 1 && channels <= RF_HISTOGRAM_CHANNELS && count > 0 && count <= UINT32_MAX);
-    *out = (RfHistogram){channels, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, NULL};
+    *out = (RfHistogram){.channels = channels, .axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     out->inverse = rf_allocate((size_t)(RF_TEXTURE_LEVELS * channels), RF_INVERSE_SIZE * sizeof(float));
     Ranked *ranked = rf_allocate(count, sizeof *ranked);
     if (!out->inverse || !ranked)
@@ -159,6 +169,7 @@ RfResult rf_histogram_create(float *pixels, size_t count, size_t stride, int cha
         for (size_t i = 0; i < count; ++i)
             ranked[i] = (Ranked){pixels[i * stride + (size_t)c], (uint32_t)i};
         qsort(ranked, count, sizeof *ranked, compare_ranked);
+        out->variance[c] = ranked_variance(ranked, count);
         for (int level = 0; level < RF_TEXTURE_LEVELS; ++level)
             fill_inverse(ranked, count, table_of(out, level, c));
         for (size_t i = 0; i < count; ++i)

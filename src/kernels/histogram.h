@@ -16,6 +16,8 @@ typedef struct RfHistogram
     int channels;
     /// Rows are the principal axes, largest variance first; the identity for fewer than 3 channels.
     float axes[3][3];
+    /// Along each axis, before it was made Gaussian.
+    float variance[3];
     /// [RF_TEXTURE_LEVELS][channels][RF_INVERSE_SIZE]: value along an axis at g = -RF_INVERSE_REACH ...
     /// RF_INVERSE_REACH.
     float *inverse;

@@ -20,8 +20,8 @@
 RfResult rf_disk_field_create(int width, int height, float radius, RfArena *arena, RfDiskField *out)
 {
     float spacing = rf_clamp(radius / 24, 0.5f, 16);
-    *out =
-        (RfDiskField){(int)ceilf((float)width / spacing), (int)ceilf((float)height / spacing), spacing, radius, NULL};
+    *out = (RfDiskField){
+        (int)ceilf((float)width / spacing), (int)ceilf((float)height / spacing), spacing, radius, NULL, NULL, 0};
     size_t cells = (size_t)out->columns * (size_t)out->rows;
     out->open = rf_arena_push(arena, cells, 1);
     if (!out->open)
@@ -46,26 +46,38 @@ void rf_disk_field_mark(RfDiskField *field, RfVec2 point)
     }
 }
 
-bool rf_disk_field_pick(const RfDiskField *field, uint64_t seed, uint64_t frame, RfVec2 *point)
+RfResult rf_disk_field_list(RfDiskField *field, RfArena *arena)
 {
-    // Two passes over the bytes: count, then find the chosen one. A step adds few points, so nothing is kept between
-    // calls.
-    size_t cells = (size_t)field->columns * (size_t)field->rows, count = 0;
-    for (size_t i = 0; i < cells; ++i)
+    int cells = field->columns * field->rows, count = 0;
+    for (int i = 0; i < cells; ++i)
         count += field->open[i];
-    if (count == 0)
-        return false;
-    size_t chosen = rf_random_below((uint32_t)count, seed, frame, count, 0x6469736b), seen = 0;
-    for (size_t i = 0; i < cells; ++i)
+    field->list = rf_arena_push(arena, (size_t)count, sizeof *field->list);
+    if (!field->list)
+        return RF_OUT_OF_MEMORY;
+    field->list_count = 0;
+    for (int i = 0; i < cells && count > 0; ++i)
+        if (field->open[i])
+            field->list[field->list_count++] = i;
+    return RF_OK;
+}
+
+int rf_disk_field_pick(RfDiskField *field, uint64_t seed, uint64_t frame, uint64_t draw)
+{
+    for (uint64_t attempt = 0; field->list_count > 0; ++attempt)
     {
-        seen += field->open[i];
-        if (seen <= chosen)
-            continue;
-        *point = (RfVec2){((float)(i % (size_t)field->columns) + 0.5f) * field->spacing,
-                          ((float)(i / (size_t)field->columns) + 0.5f) * field->spacing};
-        return true;
+        uint32_t place = rf_random_below((uint32_t)field->list_count, seed, frame, draw, attempt);
+        int cell = field->list[place];
+        if (field->open[cell])
+            return cell;
+        field->list[place] = field->list[--field->list_count];
     }
-    return false;
+    return -1;
+}
+
+RfVec2 rf_disk_field_centre(const RfDiskField *field, int cell)
+{
+    return (RfVec2){((float)(cell % field->columns) + 0.5f) * field->spacing,
+                    ((float)(cell / field->columns) + 0.5f) * field->spacing};
 }
 
 static int compare_pairs(const void *left, const void *right)

@@ -12,6 +12,8 @@ typedef struct RfDiskField
     int columns, rows;
     float spacing, radius;
     uint8_t *open;
+    /// Cells that were open when the list was made, in no order; closed ones leave it when they are met.
+    int *list, list_count;
 } RfDiskField;
 
 /// All cells open, memory from the arena. `radius` is the Poisson-disk radius d, in pixels of the width x height
@@ -21,9 +23,13 @@ RfResult rf_disk_field_create(int width, int height, float radius, RfArena *aren
 /// Closes the cells that lie within the radius of the point altogether.
 void rf_disk_field_mark(RfDiskField *field, RfVec2 point);
 
-/// Picks an open cell at random and returns its centre in *point; false when none is open: the distribution is then
-/// maximal. The caller places a point within the cell and marks it.
-bool rf_disk_field_pick(const RfDiskField *field, uint64_t seed, uint64_t frame, RfVec2 *point);
+/// Lists the open cells, after the old points are marked and before the first pick.
+RfResult rf_disk_field_list(RfDiskField *field, RfArena *arena);
+
+/// Picks an open cell at random: its index, or -1 when none is open: the distribution is then maximal. `draw` numbers
+/// the picks of one filling. The caller places a point in the cell and marks it, or closes the cell.
+int rf_disk_field_pick(RfDiskField *field, uint64_t seed, uint64_t frame, uint64_t draw);
+RfVec2 rf_disk_field_centre(const RfDiskField *field, int cell);
 
 typedef struct RfPair
 {

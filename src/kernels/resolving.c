@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Yu, Neyret, Bruneton, Holzschuch 2009, equations 2 and 3 (3 with its root and mean put back), and one between them.
+//
+// With pictures of equal variance v and pairwise correlation rho_ij, sum_i w_i T_i has the variance v (sum w_i^2 +
+// sum_(i != j) rho_ij w_i w_j). Dividing by the root of the bracket brings v back. Independent pictures (rho = 0) give
+// equation 3; equal ones (rho = 1) give the plain mean.
+
+#include "kernels/resolving.h"
+#include "core/simd.h"
+
+#include <math.h>
+
+RF_WIDE_BODY void rf_resolve_scales_body(const float *restrict weight, const float *restrict weight2,
+                                         const float *restrict rho, int count, float *restrict inverse_sum,
+                                         float *restrict inverse_norm)
+{
+#pragma omp simd
+    for (int k = 0; k < count; ++k)
+    {
+        float w = weight[k], w2 = weight2[k], norm2 = w2 + rho[k] * fmaxf(w * w - w2, 0);
+        inverse_sum[k] = w > 0 ? 1 / w : 0;
+        inverse_norm[k] = norm2 > 0 ? 1 / sqrtf(norm2) : inverse_sum[k];
+    }
+}
+
+RF_WIDE(rf_resolve_scales,
+        (const float *weight, const float *weight2, const float *rho, int count, float *inverse_sum,
+         float *inverse_norm),
+        (weight, weight2, rho, count, inverse_sum, inverse_norm))
+
+RF_WIDE_BODY void rf_resolve_row_body(const float *restrict colour, const float *restrict inverse_sum,
+                                      const float *restrict inverse_norm, const RfResolveQuad *quad, int count,
+                                      float *restrict values)
+{
+    for (int k = 0; k < count; ++k)
+        for (int c = 0; c < 4; ++c)
+        {
+            float scale = inverse_norm[k] + quad->plain[c] * (inverse_sum[k] - inverse_norm[k]);
+            float value = quad->mean[c] + colour[4 * k + c] * scale;
+            value = value > quad->low[c] ? value : quad->low[c];
+            values[4 * k + c] = value < quad->high[c] ? value : quad->high[c];
+        }
+}
+
+RF_WIDE(rf_resolve_row,
+        (const float *colour, const float *inverse_sum, const float *inverse_norm, const RfResolveQuad *quad, int count,
+         float *values),
+        (colour, inverse_sum, inverse_norm, quad, count, values))

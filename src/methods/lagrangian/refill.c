@@ -1,0 +1,419 @@
+// SPDX-License-Identifier: Apache-2.0
+// New grids: where, showing what, and how they come in.
+//
+// The paper gives a new grid a random area of the exemplar and names a smarter choice as future work. Ours takes the
+// place that fits best what the other grids draw there now, so that a fade changes little: cells of foam stay cells,
+// and the eye (and an optical-flow estimator) sees less of it. The search goes coarse to fine: a window over the new
+// kernel is drawn at a spacing at which it has some 30 pixels across, compared at many places of the exemplar at the
+// same spacing, and the best few are followed down to single pixels.
+//
+// Because old and new grid then resemble each other, blending them as if they were independent would overshoot
+// (equation 3 assumes so). Their correlation is measured at birth, over the area that both draw, and drawing divides by
+//
+//     sqrt(sum_i w_i^2 + sum_(i != j) rho_ij w_i w_j).
+//
+// All grids are carried by one flow, so the two pictures keep their places on each other, and rho stays what it was at
+// birth.
+//
+// Deviation: K_p ends at 1.1 d, not d. A particle is born where no other is nearer than d, and with the paper's radius
+// all weights would be 0 there.
+
+#include "methods/lagrangian/lagrangian.h"
+
+#include "core/maths.h"
+#include "core/random.h"
+#include "core/result.h"
+#include "data/flow_field.h"
+#include "kernels/best_match.h"
+#include "kernels/poisson_disk.h"
+
+#include <string.h>
+
+enum
+{
+    // Pixels across a window at the coarsest spacing.
+    WINDOW_PIXELS = 40,
+    KEEP = 6,
+    MAX_OVERLAPS = 96
+};
+
+// Weights of others under this (to the power of the sharpness) count as none: the new grid is needed at once.
+#define UNCOVERED 0.02f
+// Resemblances under this are not worth a place.
+#define LEAST_RESEMBLANCE 0.03f
+
+/// A picture of what is drawn round a point, at some spacing.
+typedef struct Patch
+{
+    RfDrawJob job;
+    RfTileSums sums;
+} Patch;
+
+typedef struct Birth
+{
+    RfLagrangian *l;
+    RfVec2 centre;
+    int index;
+    int overlaps[MAX_OVERLAPS], overlap_count;
+} Birth;
+
+static RfResult patch_create(const RfLagrangian *l, RfVec2 centre, int halvings, float radius, RfArena *arena,
+                             Patch *out)
+{
+    float spacing = (float)(1 << halvings);
+    int side = rf_clamp_int((int)ceilf(2 * radius / spacing), 3, RF_TILE_SPAN);
+    const Material *m = &l->material;
+    out->job = (RfDrawJob){.texture = &m->texture,
+                           .sharpness = l->options.sharpness,
+                           .origin = {centre.x - 0.5f * (float)side * spacing, centre.y - 0.5f * (float)side * spacing},
+                           .spacing = spacing,
+                           .width = side,
+                           .height = side,
+                           .level_bias = halvings + 1};
+    memcpy(out->job.turned, m->turned, sizeof m->turned);
+    size_t pixels = (size_t)RF_TILE_SPAN * RF_TILE_SPAN;
+    out->sums.colour = rf_arena_push(arena, pixels * 4 * (size_t)m->texture.quads, sizeof(float));
+    out->sums.weight = rf_arena_push(arena, pixels, sizeof(float));
+    out->sums.weight2 = rf_arena_push(arena, pixels, sizeof(float));
+    out->sums.level = rf_arena_push(arena, pixels, sizeof(float));
+    if (!out->sums.colour || !out->sums.weight || !out->sums.weight2 || !out->sums.level)
+        return RF_OUT_OF_MEMORY;
+    rf_tile_clear(&out->sums, m->texture.quads);
+    return RF_OK;
+}
+
+static void find_overlaps(Birth *birth)
+{
+    const RfLagrangian *l = birth->l;
+    float reach = KERNEL_RADIUS * l->radius;
+    birth->overlap_count = 0;
+    for (int i = 0; i < birth->index && birth->overlap_count < MAX_OVERLAPS; ++i)
+        if (rf_vec2_length(rf_vec2_sub(l->grids[i].centre, birth->centre)) < 2 * reach)
+            birth->overlaps[birth->overlap_count++] = i;
+}
+
+static void draw_overlaps(const Birth *birth, Patch *patch)
+{
+    int64_t pixels = 0;
+    for (int i = 0; i < birth->overlap_count; ++i)
+    {
+        RfDrawGrid grid = draw_grid_of(birth->l, birth->overlaps[i], birth->l->time);
+        rf_tile_draw(&patch->job, &grid, &patch->sums, NULL, &pixels);
+    }
+}
+
+// The others' summed weight at the centre, as a weight of the linear kernel.
+static float weight_at_centre(const Birth *birth, const Patch *patch)
+{
+    int middle = patch->job.width / 2;
+    return powf(patch->sums.weight[middle * RF_TILE_SPAN + middle], 1 / birth->l->options.sharpness);
+}
+
+// Turns a patch into a window to search for: colours blended as a frame's are, weighted by the new grid's kernel where
+// something is drawn.
+static RfResult window_create(const Birth *birth, const Patch *patch, int halvings, RfArena *arena, RfMatchWindow *out)
+{
+    const Material *m = &birth->l->material;
+    int side = patch->job.width, quads = m->texture.quads;
+    size_t numbers = (size_t)(side * side * quads) * 4;
+    float *target = rf_arena_push(arena, numbers, sizeof(float)),
+          *weight = rf_arena_push(arena, numbers, sizeof(float));
+    if (!target || !weight)
+        return RF_OUT_OF_MEMORY;
+    float reach = KERNEL_RADIUS * birth->l->radius, spacing = patch->job.spacing;
+    size_t k = 0;
+    for (int q = 0; q < quads; ++q)
+        for (int y = 0; y < side; ++y)
+            for (int x = 0; x < side; ++x)
+            {
+                size_t pixel = (size_t)y * RF_TILE_SPAN + (size_t)x;
+                float w2 = patch->sums.weight2[pixel], scale = w2 > 0 ? 1 / sqrtf(w2) : 0;
+                float dx = ((float)x + 0.5f - 0.5f * (float)side) * spacing,
+                      dy = ((float)y + 0.5f - 0.5f * (float)side) * spacing;
+                float kernel = w2 > 0 ? fmaxf(1 - sqrtf(dx * dx + dy * dy) / reach, 0) : 0;
+                const float *colour = patch->sums.colour + ((size_t)q * RF_TILE_SPAN * RF_TILE_SPAN + pixel) * 4;
+                for (int c = 0; c < 4; ++c, ++k)
+                {
+                    target[k] = colour[c] * scale;
+                    weight[k] = kernel * (m->turned[q] ? 0 : m->match_weight[4 * q + c]);
+                }
+            }
+    float margin = 0.5f * GRID_SIDE * birth->l->radius - 0.5f * (float)side * spacing;
+    *out = (RfMatchWindow){&m->texture, halvings + 1, side, side, rf_max_int((int)ceilf(margin / spacing), 0),
+                           target,      weight};
+    return RF_OK;
+}
+
+// Exemplar minus frame coordinates for the window's first pixel on a texel, and back.
+static float offset_of(float texel, float scale, float origin, float spacing)
+{
+    return texel / scale + 0.5f - (origin + 0.5f * spacing);
+}
+
+static float texel_of(float offset, float scale, float origin, float spacing)
+{
+    return (offset + origin + 0.5f * spacing - 0.5f) * scale;
+}
+
+static RfVec2 match_offset(const RfMatchWindow *window, const Patch *patch, const RfMatch *match)
+{
+    const RfTextureLevel *level = &window->texture->levels[window->level];
+    return (RfVec2){offset_of((float)match->x, level->scale_x, patch->job.origin.x, patch->job.spacing),
+                    offset_of((float)match->y, level->scale_y, patch->job.origin.y, patch->job.spacing)};
+}
+
+// The best of the 3 x 3 places round an offset.
+static RfMatch refine(const RfMatchWindow *window, const Patch *patch, RfVec2 offset)
+{
+    const RfTextureLevel *level = &window->texture->levels[window->level];
+    int x0 = (int)lrintf(texel_of(offset.x, level->scale_x, patch->job.origin.x, patch->job.spacing));
+    int y0 = (int)lrintf(texel_of(offset.y, level->scale_y, patch->job.origin.y, patch->job.spacing));
+    int places[2];
+    rf_match_places(window, places);
+    RfMatch best = {0, 0, INFINITY};
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+        {
+            RfMatch match = {x0 + dx, y0 + dy, 0};
+            if (window->texture->tiles)
+                match = (RfMatch){rf_wrap_int(match.x, level->width), rf_wrap_int(match.y, level->height), 0};
+            else
+                match =
+                    (RfMatch){rf_clamp_int(match.x, window->margin, window->margin + rf_max_int(places[0], 1) - 1),
+                              rf_clamp_int(match.y, window->margin, window->margin + rf_max_int(places[1], 1) - 1), 0};
+            if (match.x < 0 || match.y < 0 ||
+                (!window->texture->tiles &&
+                 (match.x + window->width > level->width || match.y + window->height > level->height)))
+                continue;
+            rf_match_cost(window, match.x, match.y, &match.cost);
+            if (match.cost < best.cost)
+                best = match;
+        }
+    return best;
+}
+
+// Follows the coarse matches down to single pixels, halving their number on the way.
+static RfResult refine_down(const Birth *birth, int halvings, RfVec2 *offsets, int count, RfArena *arena)
+{
+    for (int h = halvings - 1; h >= 0; --h)
+    {
+        Patch patch;
+        RfMatchWindow window;
+        RF_TRY(patch_create(birth->l, birth->centre, h, birth->l->radius, arena, &patch));
+        draw_overlaps(birth, &patch);
+        RF_TRY(window_create(birth, &patch, h, arena, &window));
+        float costs[KEEP];
+        for (int i = 0; i < count; ++i)
+        {
+            RfMatch match = refine(&window, &patch, offsets[i]);
+            RfVec2 offset = match.cost < INFINITY ? match_offset(&window, &patch, &match) : offsets[i];
+            int slot = i;
+            for (; slot > 0 && match.cost < costs[slot - 1]; --slot)
+            {
+                costs[slot] = costs[slot - 1];
+                offsets[slot] = offsets[slot - 1];
+            }
+            costs[slot] = match.cost;
+            offsets[slot] = offset;
+        }
+        count = rf_max_int(count / 2, 1);
+    }
+    return RF_OK;
+}
+
+static RfVec2 random_offset(const Birth *birth)
+{
+    const RfLagrangian *l = birth->l;
+    const RfTexture *texture = &l->material.texture;
+    float side = GRID_SIDE * l->radius;
+    float r[2];
+    for (int axis = 0; axis < 2; ++axis)
+        r[axis] = rf_random_float(l->options.seed, l->step, l->grids[birth->index].id, (uint64_t)axis);
+    float room_x = texture->tiles ? (float)texture->width : fmaxf((float)texture->width - side, 0);
+    float room_y = texture->tiles ? (float)texture->height : fmaxf((float)texture->height - side, 0);
+    return (RfVec2){r[0] * room_x - (birth->centre.x - 0.5f * side), r[1] * room_y - (birth->centre.y - 0.5f * side)};
+}
+
+static int coarsest_halvings(const RfLagrangian *l)
+{
+    int halvings = 0;
+    while ((float)(WINDOW_PIXELS << halvings) < 2 * l->radius && halvings + 2 < l->material.texture.level_count)
+        ++halvings;
+    return halvings;
+}
+
+// Exemplar minus frame coordinates of the new grid.
+static RfResult choose_area(Birth *birth, const Patch *coarse, int halvings, RfArena *arena, RfVec2 *offset)
+{
+    RfLagrangian *l = birth->l;
+    *offset = random_offset(birth);
+    if (l->options.candidates <= 1 || birth->overlap_count == 0)
+        return RF_OK;
+    RfMatchWindow window;
+    RF_TRY(window_create(birth, coarse, halvings, arena, &window));
+    RfMatch best[KEEP];
+    int count = rf_match_search(&window, l->options.candidates, KEEP, l->options.seed, l->step,
+                                l->grids[birth->index].id, best);
+    if (count == 0 || best[0].cost == 0)
+        return RF_OK; // Nothing fits, or nothing is drawn there: any place is as good.
+    RfVec2 offsets[KEEP];
+    for (int i = 0; i < count; ++i)
+        offsets[i] = match_offset(&window, coarse, &best[i]);
+    RF_TRY(refine_down(birth, halvings, offsets, count, arena));
+    *offset = offsets[0];
+    return RF_OK;
+}
+
+// Correlation of two solo drawings where both are: sum w_i w_j T_i T_j over the root of the like sums of T_i^2 and
+// T_j^2.
+static float correlation(const Material *m, const Patch *mine, const Patch *other)
+{
+    double cross = 0, own = 0, others = 0;
+    int side = mine->job.width;
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x)
+        {
+            size_t pixel = (size_t)y * RF_TILE_SPAN + (size_t)x;
+            float wi = mine->sums.weight[pixel], wj = other->sums.weight[pixel];
+            if (!(wi > 0) || !(wj > 0))
+                continue;
+            for (int q = 0; q < m->texture.quads; ++q)
+                for (int c = 0; c < 4 && !m->turned[q]; ++c)
+                {
+                    size_t place = ((size_t)q * RF_TILE_SPAN * RF_TILE_SPAN + pixel) * 4 + (size_t)c;
+                    float weight = m->match_weight[4 * q + c], a = mine->sums.colour[place],
+                          b = other->sums.colour[place];
+                    cross += (double)(weight * a * b);
+                    own += (double)(weight * a * a * (wj / wi));
+                    others += (double)(weight * b * b * (wi / wj));
+                }
+        }
+    return own > 0 && others > 0 ? (float)(cross / sqrt(own * others)) : 0;
+}
+
+static void remember(Grid *grid, Resemblance resemblance)
+{
+    if (grid->resemblance_count < MAX_RESEMBLANCES)
+    {
+        grid->resemblances[grid->resemblance_count++] = resemblance;
+        return;
+    }
+    int weakest = 0;
+    for (int i = 1; i < MAX_RESEMBLANCES; ++i)
+        if (grid->resemblances[i].correlation < grid->resemblances[weakest].correlation)
+            weakest = i;
+    if (resemblance.correlation > grid->resemblances[weakest].correlation)
+        grid->resemblances[weakest] = resemblance;
+}
+
+static RfResult measure_resemblances(Birth *birth, int halvings, RfArena *arena)
+{
+    RfLagrangian *l = birth->l;
+    Grid *grid = &l->grids[birth->index];
+    int64_t pixels = 0;
+    float reach = KERNEL_RADIUS * l->radius;
+    Patch mine, other;
+    RF_TRY(patch_create(l, birth->centre, halvings, reach, arena, &mine));
+    RF_TRY(patch_create(l, birth->centre, halvings, reach, arena, &other));
+    // Correlation is a matter of all frequencies, so the full texture is sampled, if at few places.
+    mine.job.level_bias = other.job.level_bias = 0;
+    mine.job.sharpness = other.job.sharpness = 1;
+    RfDrawGrid solo = draw_grid_of(l, birth->index, l->time);
+    solo.fade = 1;
+    rf_tile_draw(&mine.job, &solo, &mine.sums, NULL, &pixels);
+    for (int i = 0; i < birth->overlap_count; ++i)
+    {
+        RfDrawGrid old = draw_grid_of(l, birth->overlaps[i], l->time);
+        if (!(old.fade > 0))
+            continue;
+        rf_tile_clear(&other.sums, l->material.texture.quads);
+        rf_tile_draw(&other.job, &old, &other.sums, NULL, &pixels);
+        float rho = correlation(&l->material, &mine, &other);
+        if (rho > LEAST_RESEMBLANCE)
+            remember(grid, (Resemblance){old.id, fminf(rho, 1)});
+    }
+    return RF_OK;
+}
+
+static void place_vertices(RfLagrangian *l, int index, RfVec2 centre)
+{
+    int n = l->options.grid_vertices;
+    size_t first = (size_t)index * (size_t)(n * n);
+    float half = 0.5f * GRID_SIDE * l->radius;
+    for (int k = 0; k < n * n; ++k)
+    {
+        l->x[first + (size_t)k] = centre.x - half + (float)(k % n) * l->cell;
+        l->y[first + (size_t)k] = centre.y - half + (float)(k / n) * l->cell;
+        l->quality[first + (size_t)k] = 1;
+    }
+}
+
+static RfResult give_birth(RfLagrangian *l, const StepFlow *flow, RfVec2 centre)
+{
+    RF_TRY(grids_reserve(l, l->count + 1));
+    Birth birth = {.l = l, .centre = centre, .index = l->count};
+    Grid *grid = &l->grids[birth.index];
+    *grid = (Grid){.id = l->next_id, .birth = l->time, .centre = centre};
+    place_vertices(l, birth.index, centre);
+    grids_measure_new(l, flow, birth.index);
+    find_overlaps(&birth);
+
+    RfArena *arena = &l->workers[0];
+    int halvings = coarsest_halvings(l);
+    Patch patch;
+    RfVec2 offset;
+    RF_TRY(patch_create(l, centre, halvings, l->radius, arena, &patch));
+    draw_overlaps(&birth, &patch);
+    RF_TRY(choose_area(&birth, &patch, halvings, arena, &offset));
+    float half = 0.5f * GRID_SIDE * l->radius;
+    grid->u0 = centre.x - half + offset.x;
+    grid->v0 = centre.y - half + offset.y;
+    if (l->started && weight_at_centre(&birth, &patch) >= UNCOVERED)
+    {
+        grid->fade_in = fade_length(l, grid->strain);
+        grid->birth = flow->from;
+    }
+    if (l->options.candidates > 1 && l->options.blend != RF_BLEND_PLAIN)
+        RF_TRY(measure_resemblances(&birth, halvings, arena));
+    rf_arena_reset(arena);
+    ++l->count;
+    ++l->next_id;
+    ++l->stats.born;
+    return RF_OK;
+}
+
+// A point of the cell that is in the fluid.
+static bool fluid_point(const RfDiskField *field, int cell, const RfLagrangian *l, const StepFlow *flow, RfVec2 *point)
+{
+    static const float places[5][2] = {{0, 0}, {-0.49f, -0.49f}, {0.49f, -0.49f}, {-0.49f, 0.49f}, {0.49f, 0.49f}};
+    RfVec2 centre = rf_disk_field_centre(field, cell);
+    for (int i = 0; i < 5; ++i)
+    {
+        *point = (RfVec2){centre.x + places[i][0] * field->spacing, centre.y + places[i][1] * field->spacing};
+        if (point->x < (float)l->width && point->y < (float)l->height &&
+            rf_flow_inside(flow->view, point->x / flow->scale_x, point->y / flow->scale_y))
+            return true;
+    }
+    return false;
+}
+
+RfResult grids_refill(RfLagrangian *l, const StepFlow *flow)
+{
+    RfDiskField field;
+    RF_TRY(rf_disk_field_create(l->width, l->height, l->radius, &l->arena, &field));
+    for (int i = 0; i < l->count; ++i)
+        if (!l->grids[i].retired)
+            rf_disk_field_mark(&field, l->grids[i].centre);
+    RF_TRY(rf_disk_field_list(&field, &l->arena));
+    int cell;
+    for (uint64_t draw = 0; (cell = rf_disk_field_pick(&field, l->options.seed, l->step, draw)) >= 0; ++draw)
+    {
+        RfVec2 point;
+        field.open[cell] = 0;
+        if (!fluid_point(&field, cell, l, flow, &point))
+            continue;
+        RF_TRY(give_birth(l, flow, point));
+        rf_disk_field_mark(&field, point);
+    }
+    return RF_OK;
+}
