@@ -196,15 +196,23 @@ static bool is_file(const char *path)
     return stat(path, &status) == 0 && S_ISREG(status.st_mode);
 }
 
+// A PNG counts only with its JSON beside it.
+static bool can_be_flow(const char *directory, const char *name, const char *extension)
+{
+    const char *dot = strrchr(name, '.');
+    if (!dot || dot == name || strcasecmp(dot + 1, extension) != 0)
+        return false;
+    char companion[4096];
+    int length = snprintf(companion, sizeof companion, "%s/%.*s.json", directory, (int)(dot - name), name);
+    return strcmp(extension, "png") != 0 || ((size_t)length < sizeof companion && is_file(companion));
+}
+
 static bool has_file_with(const char *directory, const char *extension)
 {
     DIR *folder = opendir(directory);
     bool found = false;
     for (struct dirent *entry; folder && !found && (entry = readdir(folder));)
-    {
-        const char *dot = strrchr(entry->d_name, '.');
-        found = dot && dot != entry->d_name && strcasecmp(dot + 1, extension) == 0;
-    }
+        found = can_be_flow(directory, entry->d_name, extension);
     if (folder)
         closedir(folder);
     return found;
@@ -217,8 +225,9 @@ static RfResult open_directory(RfFlow *flow)
     for (int i = 0; (extension = rf_flow_format_extension(i)) != NULL; ++i)
         if (has_file_with(flow->path, extension))
             return rf_sequence_open(flow->path, extension, &flow->sequence);
-    return rf_fail(RF_BAD_INPUT, flow->path, NULL,
-                   "the directory holds no 2D flow: looked for flo, npy, exr, vti, vec, txt and png files");
+    return rf_fail(
+        RF_BAD_INPUT, flow->path, NULL,
+        "the directory holds no 2D flow: looked for flo, npy, exr, vti, vec, txt (PIV) files, and png beside json");
 }
 
 static RfResult open_single(RfFlow *flow)

@@ -14,7 +14,7 @@ static const RfFlowFormat *const formats[] = {
     &rf_flow_format_vti, &rf_flow_format_netcdf, &rf_flow_format_vec, &rf_flow_format_openpiv,
 };
 
-static const char *const directory_extensions[] = {"flo", "npy", "exr", "vti", "vec", "txt", "png"};
+static const char *const directory_extensions[] = {"flo", "npy", "exr", "vti", "vec", "png", "txt"};
 
 enum
 {

@@ -3,8 +3,10 @@
 // on the vector's validity, one vector a line, in image pixels and pixels between the two exposures.
 //
 // Which way y runs. Insight says so: OriginInImageY is the image row, counted from the top, on which y is 0. In the
-// files seen it is the last row (2671 of 2672), so y runs up, and v with it. OpenPIV says nothing, but writes the rows
-// of the image in order, the top one first: y falling down the file runs up, y growing down the file runs down. The
+// files seen it is the last row (2671 of 2672), so y runs up, and v with it: read so, the six fields of a cavity have
+// a root mean square divergence of 1.1, with v the other way 1.4. OpenPIV says nothing, but writes the rows of the
+// image in order, the top one first: y falling down the file runs up, y growing down the file runs down. In the field
+// seen y falls, and the stream parts before its cylinder, away from it on both sides, only if v points along y. The
 // same rule serves a .vec without an origin. Vectors are placed by their coordinates, not by their order.
 //
 // Validity. Insight: CHC <= 0 is invalid. OpenPIV: a flag other than 0 is invalid. Invalid vectors are measurements
