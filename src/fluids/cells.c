@@ -17,7 +17,7 @@ enum
     NEAR = 24,
     MAX_CELLS = 8192,
     /// Throws for each radius, and radii tried from large to small.
-    THROWS = 220,
+    THROWS = 70,
     SIZES = 24
 };
 
