@@ -252,19 +252,23 @@ static void a_full_disk_and_a_missing_folder_fail(void **state)
     assert_int_equal(make_video(test_folder_file(&folder, "gone/v.mp4"), 64, 64, 3, 2), RF_WRITE_FAILED);
     RfVideo *video;
     assert_int_equal(rf_video_open(test_folder_file(&folder, "v.avi"), 64, 64, 24, &video), RF_UNSUPPORTED);
-    const char *path = test_folder_file(&folder, "v.gif");
-    pid_t child = fork();
-    if (child == 0)
+    static const char *const names[] = {"v.gif", "v.mp4", "v.webm", "v.mov"};
+    for (int i = 0; i < 4; ++i)
     {
-        signal(SIGXFSZ, SIG_IGN);
-        struct rlimit small = {2000, 2000};
-        setrlimit(RLIMIT_FSIZE, &small);
-        _exit((int)make_video(path, 256, 256, 3, 30));
+        const char *path = test_folder_file(&folder, names[i]);
+        pid_t child = fork();
+        if (child == 0)
+        {
+            signal(SIGXFSZ, SIG_IGN);
+            struct rlimit small = {1000, 1000};
+            setrlimit(RLIMIT_FSIZE, &small);
+            _exit((int)make_video(path, 256, 256, 3, 30));
+        }
+        int status = 0;
+        waitpid(child, &status, 0);
+        assert_true(WIFEXITED(status));
+        assert_int_equal(WEXITSTATUS(status), RF_WRITE_FAILED);
     }
-    int status = 0;
-    waitpid(child, &status, 0);
-    assert_true(WIFEXITED(status));
-    assert_int_equal(WEXITSTATUS(status), RF_WRITE_FAILED);
     assert_int_equal(test_folder_count(&folder), 0);
     test_folder_remove(&folder);
 }

@@ -241,9 +241,9 @@ static RfResult start_encoder(RfVideo *video, const VideoFormat *format, const V
     snprintf(rate, sizeof rate, "%ld/1000", lroundf(fps * 1000));
     // "file:" keeps a name with a colon from being taken for a protocol.
     snprintf(output, sizeof output, "file:%s", video->temporary);
-    const char *const before[] = {"ffmpeg", "-hide_banner", "-nostdin", "-nostats", "-loglevel", "error",
-                                  "-y",     "-f",           "rawvideo", "-pix_fmt", "rgb24",     "-video_size",
-                                  size,     "-framerate",   rate,       "-i",       "pipe:0"};
+    const char *const before[] = {"ffmpeg",      "-hide_banner", "-nostdin",   "-xerror",  "-nostats", "-loglevel",
+                                  "error",       "-y",           "-f",         "rawvideo", "-pix_fmt", "rgb24",
+                                  "-video_size", size,           "-framerate", rate,       "-i",       "pipe:0"};
     const char *const after[] = {"-an",      "-threads",  "4",  "-map_metadata",   "-1",  "-fflags", "+bitexact",
                                  "-flags:v", "+bitexact", "-f", format->extension, output};
     const char *arguments[MAX_ARGUMENTS];
