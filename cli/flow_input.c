@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "flow_input.h"
+#include "errors.h"
+#include "inputs.h"
+
+#include <stdlib.h>
+
+/// Mean over the mask's pixels that cell (i of n) covers, colours together, alpha left out.
+static float mean_of_cell(const RfImageView *image, int colours, int i, int width, int j, int height)
+{
+    int x0 = (int)((int64_t)i * image->width / width), x1 = (int)((int64_t)(i + 1) * image->width / width);
+    int y0 = (int)((int64_t)j * image->height / height), y1 = (int)((int64_t)(j + 1) * image->height / height);
+    x1 = x1 > x0 ? x1 : x0 + 1;
+    y1 = y1 > y0 ? y1 : y0 + 1;
+    double sum = 0;
+    for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x)
+            for (int c = 0; c < colours; ++c)
+                sum += (double)image->pixels[y * image->row_stride + (ptrdiff_t)x * image->channels + c];
+    return (float)(sum / ((double)(x1 - x0) * (y1 - y0) * colours));
+}
+
+static int read_mask(FlowInput *input, const char *path)
+{
+    RfImage *image = NULL;
+    RfResult result = rf_image_read(path, &image);
+    if (result != RF_OK)
+        return fail_result(result, path);
+    RfImageView view = rf_image_view(image);
+    int colours = view.channels - (rf_image_has_alpha(image) ? 1 : 0);
+    int width = input->info.width, height = input->info.height;
+    size_t size = (size_t)width * (size_t)height;
+    input->mask = malloc(size);
+    bool any = false;
+    for (int j = 0; j < height && input->mask; ++j)
+        for (int i = 0; i < width; ++i)
+        {
+            // Written so that NaN is land.
+            bool fluid = mean_of_cell(&view, colours, i, width, j, height) >= 0.5f;
+            input->mask[(size_t)j * (size_t)width + (size_t)i] = fluid;
+            any = any || fluid;
+        }
+    rf_image_destroy(image);
+    if (!input->mask)
+        return fail(CODE_FAILED, path, NULL, "out of memory");
+    input->mask_hash = hash_add(1, input->mask, size);
+    return any ? CODE_DONE
+               : fail(CODE_BAD_INPUT, path, NULL, "the mask is black everywhere, so there is no fluid; white is fluid");
+}
+
+int flow_input_open(FlowInput *input, const Settings *settings, const char *path)
+{
+    *input = (FlowInput){.path = path};
+    RfFlowReadOptions options = rf_flow_read_defaults();
+    options.fps = (float)settings->fps;
+    options.velocity_scale = (float)settings->velocity_scale;
+    options.moment_every = settings->moment_every;
+    options.variables = settings->variables;
+    RfResult result = rf_flow_open(path, &options, &input->flow);
+    if (result != RF_OK)
+        return fail_result(result, path);
+    input->info = rf_flow_info(input->flow);
+    return settings->mask ? read_mask(input, settings->mask) : CODE_DONE;
+}
+
+void flow_input_close(FlowInput *input)
+{
+    rf_flow_close(input->flow);
+    free(input->mask);
+    *input = (FlowInput){0};
+}
+
+int flow_input_at(FlowInput *input, int frame, RfFlowView *view)
+{
+    RfResult result = rf_flow_at(input->flow, frame, view);
+    if (result != RF_OK)
+        return fail_result(result, input->path);
+    if (input->mask)
+        view->mask = input->mask;
+    return CODE_DONE;
+}
+
+int flow_input_hash(FlowInput *input, const Settings *settings, int first_frame, uint64_t *hash)
+{
+    RfFlowView view;
+    int code = flow_input_at(input, first_frame, &view);
+    if (code)
+        return code;
+    double numbers[] = {settings->fps, settings->velocity_scale, view.width,
+                        view.height,   input->info.first_frame,  settings->moment_every};
+    *hash = hash_add(*hash, numbers, sizeof numbers);
+    *hash = hash_add(*hash, view.velocity, (size_t)view.width * (size_t)view.height * 2 * sizeof(float));
+    *hash = hash_add(*hash, &input->mask_hash, sizeof input->mask_hash);
+    *hash = hash_add_text(*hash, settings->variables ? settings->variables : "");
+    return CODE_DONE;
+}

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// The flow of a run, with the mask that the user gives in place of its own.
+#pragma once
+
+#include "options.h"
+
+typedef struct FlowInput
+{
+    RfFlow *flow;
+    RfFlowInfo info;
+    const char *path;
+    /// [height][width]; NULL: the flow's own.
+    uint8_t *mask;
+    uint64_t mask_hash;
+} FlowInput;
+
+/// Reads the mask of --mask too, if the verb has it.
+int flow_input_open(FlowInput *input, const Settings *settings, const char *path);
+void flow_input_close(FlowInput *input);
+int flow_input_at(FlowInput *input, int frame, RfFlowView *view);
+/// Of everything that a flow's frames depend on: options, sizes and first moment; files are in InputFiles' hash.
+int flow_input_hash(FlowInput *input, const Settings *settings, int first_frame, uint64_t *hash);

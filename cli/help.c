@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "option_table.h"
+#include "text.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum
+{
+    NAME_COLUMN = 32,
+    LINE_WIDTH = 118
+};
+
+/// Prints words from the name column on, breaking lines between them.
+static void print_wrapped(const char *text)
+{
+    int column = NAME_COLUMN;
+    while (*text)
+    {
+        int length = (int)strcspn(text, " ");
+        if (column + length > LINE_WIDTH && column > NAME_COLUMN)
+        {
+            printf("\n%*s", NAME_COLUMN, "");
+            column = NAME_COLUMN;
+        }
+        printf("%.*s", length, text);
+        text += length;
+        column += length;
+        if (*text == ' ')
+        {
+            fputc(' ', stdout);
+            ++column;
+            ++text;
+        }
+    }
+    fputc('\n', stdout);
+}
+
+static void print_entry(const char *name, const char *text)
+{
+    if ((int)strlen(name) >= NAME_COLUMN)
+        printf("%s\n%*s", name, NAME_COLUMN, "");
+    else
+        printf("%-*s", NAME_COLUMN, name);
+    print_wrapped(text);
+}
+
+static void print_generic(const GenericOption *option)
+{
+    char name[96], text[512], letter[8] = "";
+    if (option->letter)
+        snprintf(letter, sizeof letter, "-%c, ", option->letter);
+    snprintf(name, sizeof name, "  %s--%s%s%s", letter, option->name, option->value ? " " : "",
+             option->value ? option->value : "");
+    snprintf(text, sizeof text, "%s%s%s%s", option->sentence, option->fallback[0] ? " [" : "", option->fallback,
+             option->fallback[0] ? "]" : "");
+    print_entry(name, text);
+}
+
+static void describe_range(const RfOption *option, char *text, size_t size)
+{
+    const char *unit = option->unit && option->unit[0] ? option->unit : "";
+    if (option->kind == RF_OPTION_FLOAT || option->kind == RF_OPTION_INT)
+        snprintf(text, size, "[%g; %g to %g%s%s]", option->default_value, option->minimum, option->maximum,
+                 unit[0] ? " " : "", unit);
+    else if (option->kind == RF_OPTION_BOOL)
+        snprintf(text, size, "[%s]", option->default_value != 0 ? "yes" : "no");
+    else
+        snprintf(text, size, "[%g]", option->default_value);
+}
+
+static void print_method_option(const RfOption *option)
+{
+    static const char *const values[] = {" X", " N", " N", "[=yes|no]", " "};
+    char name[128], text[768], range[128] = "";
+    bool choice = option->kind == RF_OPTION_CHOICE;
+    snprintf(name, sizeof name, "    --%s%s%s", option->name, values[option->kind], choice ? option->choices : "");
+    if (choice)
+    {
+        const char *at = option->choices;
+        for (int i = 0; i < (int)option->default_value && strchr(at, '|'); ++i)
+            at = strchr(at, '|') + 1;
+        snprintf(range, sizeof range, "[%.*s]", (int)strcspn(at, "|"), at);
+    }
+    else
+        describe_range(option, range, sizeof range);
+    snprintf(text, sizeof text, "%s %s", option->sentence, range);
+    print_entry(name, text);
+}
+
+static void print_method(const Method *method)
+{
+    int count = 0;
+    const RfOption *table = method->table(&count);
+    printf("\n  --method %s: %s\n", method->name, method->sentence);
+    if (method->presets)
+    {
+        char name[96];
+        snprintf(name, sizeof name, "    --preset %s", method->presets);
+        print_entry(name, "where the options below start from; paper: the constants of the publication");
+    }
+    for (int i = 0; i < count; ++i)
+        if (!generic_option(table[i].name, 0))
+            print_method_option(&table[i]);
+}
+
+void print_verb_help(const Verb *verb)
+{
+    int count = 0;
+    const GenericOption *options = generic_option_table(&count);
+    printf("riffle %s %s [options]\n%s\n", verb->name, verb->usage, verb->sentence);
+    if (verb->notes)
+        printf("\n%s", verb->notes);
+    printf("\nOptions, with their defaults in brackets:\n");
+    for (int i = 0; i < count; ++i)
+        if (options[i].verbs & verb->bit)
+            print_generic(&options[i]);
+    if (verb->bit != VERB_TEXTURE)
+        return;
+    const Method *methods = method_table(&count);
+    printf("\nMethods and their own options (default; range):\n");
+    for (int i = 0; i < count; ++i)
+        print_method(&methods[i]);
+}
+
+void print_help(const Verb *verbs, int count)
+{
+    printf("Riffle textures things that flow, by example.\n\n");
+    for (int i = 0; i < count; ++i)
+    {
+        char name[128];
+        snprintf(name, sizeof name, "riffle %s %s", verbs[i].name, verbs[i].usage);
+        print_entry(name, verbs[i].sentence);
+    }
+    printf("riffle --version | --help | VERB --help\n");
+    printf("\nInputs: a file, a numbered pattern (name.%%04d.ext, name.####.ext, name.$F4.ext), a directory,\n"
+           "a container with time in it, or a built-in one:\n");
+    int builtins = 0;
+    const RfBuiltin *table = rf_builtin_table(&builtins);
+    for (int i = 0; i < builtins; ++i)
+    {
+        char name[96], text[512];
+        snprintf(name, sizeof name, "  builtin:%s", table[i].name);
+        snprintf(text, sizeof text, "%s: %s%s%s", table[i].kind, table[i].sentence, table[i].parameters[0] ? " ?" : "",
+                 table[i].parameters);
+        print_entry(name, text);
+    }
+    printf(
+        "\nOutputs: images (png, exr, npy; a number in the name for more than one: out.%%04d.png), video (mp4, webm,\n"
+        "mov, gif), null: (computes and discards), md5: (a hash of each frame on stdout), - (PNM frames on stdout).\n"
+        "\nExit codes: 0 done, 1 failed while running, 2 wrong usage, 3 bad input, 130 and 143 stopped by a signal.\n");
+}

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// riffle info FILE...
+#include "errors.h"
+#include "flow_input.h"
+#include "image_input.h"
+#include "verbs.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static const char *format_name(RfSampleFormat format)
+{
+    static const char *const names[] = {"8 bit", "16 bit", "half", "float"};
+    return names[format];
+}
+
+static const char *encoding_name(RfEncoding encoding)
+{
+    static const char *const names[] = {"sRGB-encoded", "linear", "data"};
+    return names[encoding];
+}
+
+/// Of one channel's finite values.
+typedef struct Range
+{
+    double minimum, maximum, mean;
+    int64_t not_finite;
+} Range;
+
+static Range channel_range(const RfImageView *view, int channel)
+{
+    Range range = {.minimum = INFINITY, .maximum = -INFINITY};
+    double sum = 0;
+    int64_t count = 0;
+    for (int y = 0; y < view->height; ++y)
+        for (int x = 0; x < view->width; ++x)
+        {
+            double value = (double)view->pixels[y * view->row_stride + (ptrdiff_t)x * view->channels + channel];
+            if (!isfinite(value))
+            {
+                ++range.not_finite;
+                continue;
+            }
+            range.minimum = fmin(range.minimum, value);
+            range.maximum = fmax(range.maximum, value);
+            sum += value;
+            ++count;
+        }
+    range.mean = count ? sum / (double)count : NAN;
+    return range;
+}
+
+static void print_image_json(const ImageInput *input, const RfImage *image)
+{
+    RfImageView view = rf_image_view(image);
+    int count = image_input_count(input);
+    fputc('{', stdout);
+    print_json_member(stdout, "file", input->path);
+    printf(",\"kind\":\"image\",\"files\":%d,\"first_frame\":%d,\"last_frame\":%d,\"width\":%d,\"height\":%d,", count,
+           image_input_number(input, 0), image_input_number(input, count - 1), view.width, view.height);
+    print_json_member(stdout, "samples", format_name(rf_image_format(image)));
+    fputc(',', stdout);
+    print_json_member(stdout, "encoding", encoding_name(rf_image_encoding(image)));
+    fputs(",\"channels\":[", stdout);
+    for (int c = 0; c < view.channels; ++c)
+    {
+        Range range = channel_range(&view, c);
+        fputs(c ? ",{" : "{", stdout);
+        print_json_member(stdout, "name", rf_image_channel_name(image, c));
+        fputs(",\"minimum\":", stdout);
+        print_json_number(stdout, range.minimum);
+        fputs(",\"maximum\":", stdout);
+        print_json_number(stdout, range.maximum);
+        fputs(",\"mean\":", stdout);
+        print_json_number(stdout, range.mean);
+        printf(",\"not_finite\":%lld}", (long long)range.not_finite);
+    }
+    fputs("]}\n", stdout);
+}
+
+static void print_image(const ImageInput *input, const RfImage *image)
+{
+    RfImageView view = rf_image_view(image);
+    int count = image_input_count(input);
+    printf("%s: image, %d x %d pixels, %d channel%s, %s, %s\n", input->path, view.width, view.height, view.channels,
+           view.channels == 1 ? "" : "s", format_name(rf_image_format(image)), encoding_name(rf_image_encoding(image)));
+    if (count > 1)
+        printf("  %d files, frames %d to %d; what follows is of the first\n", count, image_input_number(input, 0),
+               image_input_number(input, count - 1));
+    for (int c = 0; c < view.channels; ++c)
+    {
+        Range range = channel_range(&view, c);
+        printf("  %s: %.4g to %.4g, mean %.4g", rf_image_channel_name(image, c), range.minimum, range.maximum,
+               range.mean);
+        if (range.not_finite > 0)
+            printf(", %lld not finite", (long long)range.not_finite);
+        fputc('\n', stdout);
+    }
+}
+
+static int image_info(const Settings *settings, const char *path)
+{
+    ImageInput input;
+    RfImage *image = NULL;
+    int code = image_input_open(&input, path);
+    if (!code)
+        code = image_input_read(&input, 0, &image);
+    if (!code && settings_json(settings))
+        print_image_json(&input, image);
+    else if (!code)
+        print_image(&input, image);
+    rf_image_destroy(image);
+    image_input_close(&input);
+    return code;
+}
+
+static void print_flow_json(const char *path, const RfFlowInfo *info)
+{
+    fputc('{', stdout);
+    print_json_member(stdout, "file", path);
+    fputs(",\"kind\":\"flow\",", stdout);
+    print_json_member(stdout, "format", info->format);
+    printf(",\"width\":%d,\"height\":%d,\"moments\":%d,\"first_frame\":%d,\"last_frame\":%d,\"mask\":%s,", info->width,
+           info->height, info->moment_count, info->first_frame, info->last_frame, info->has_mask ? "true" : "false");
+    printf("\"filled_vectors\":%d,\"max_speed\":", info->filled_vectors);
+    print_json_number(stdout, (double)info->max_speed);
+    fputs(",\"mean_speed\":", stdout);
+    print_json_number(stdout, (double)info->mean_speed);
+    fputc(',', stdout);
+    print_json_member(stdout, "conventions", info->conventions);
+    fputs("}\n", stdout);
+}
+
+static void print_flow(const char *path, const RfFlowInfo *info)
+{
+    printf("%s: 2D flow (%s), %d x %d cells, ", path, info->format, info->width, info->height);
+    if (info->moment_count == 1)
+        printf("steady");
+    else if (info->moment_count == 0)
+        printf("endless, from frame %d", info->first_frame);
+    else
+        printf("%d moments, frames %d to %d", info->moment_count, info->first_frame, info->last_frame);
+    printf(", %s\n  speed: greatest %.4g, mean %.4g cells a frame\n", info->has_mask ? "with a mask" : "no mask",
+           (double)info->max_speed, (double)info->mean_speed);
+    if (info->filled_vectors > 0)
+        printf("  %d invalid vectors, filled from their neighbours\n", info->filled_vectors);
+    if (info->conventions[0])
+        printf("  %s\n", info->conventions);
+}
+
+static int flow_info(const Settings *settings, const char *path)
+{
+    FlowInput input;
+    int code = flow_input_open(&input, settings, path);
+    if (!code && settings_json(settings))
+        print_flow_json(path, &input.info);
+    else if (!code)
+        print_flow(path, &input.info);
+    flow_input_close(&input);
+    return code;
+}
+
+int run_info(Settings *settings)
+{
+    int code = CODE_DONE;
+    for (int i = 0; i < settings->word_count && !code; ++i)
+    {
+        InputKind kind = INPUT_IMAGES;
+        code = input_kind(settings->words[i], settings->variables != NULL, true, &kind);
+        if (!code)
+            code =
+                kind == INPUT_FLOW ? flow_info(settings, settings->words[i]) : image_info(settings, settings->words[i]);
+    }
+    return code;
+}

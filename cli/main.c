@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// riffle: the command. A new verb is one line in the table below and one file.
+#include "errors.h"
+#include "stop.h"
+#include "verbs.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const Verb g_verbs[] = {
+    {"texture", VERB_TEXTURE, "FLOW EXEMPLAR OUTPUT", 3, false, "texture a 2D flow",
+     "Maps of the exemplar other than colour and alpha are written as OUTPUT.NAME.%04d.exr beside PNG frames, and all\n"
+     "in one file where OUTPUT is EXR or NPY. A stopped run leaves .NAME.rfstate beside its first frame for "
+     "--resume.\n",
+     run_texture},
+    {"render", VERB_RENDER, "INPUT OUTPUT", 2, false, "show a flow or a field of heights as images or video",
+     "INPUT is a flow, or for --as relief images: heights from 0 to 1 (a channel named height, else the first), or\n"
+     "colours with --map height=FRAMES.\n",
+     run_render},
+    {"convert", VERB_CONVERT, "INPUT OUTPUT", 2, false, "between the formats of one kind of data",
+     "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti.\n", run_convert},
+    {"info", VERB_INFO, "FILE...", 1, true, "what is in it: kind, size, channels, range, time, conventions", NULL,
+     run_info},
+};
+
+enum
+{
+    VERB_COUNT = sizeof g_verbs / sizeof g_verbs[0]
+};
+
+static int unknown_verb(const char *word)
+{
+    char names[256] = "";
+    for (int i = 0; i < VERB_COUNT; ++i)
+        snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", i ? ", " : "", g_verbs[i].name);
+    return fail(CODE_USAGE, NULL, NULL, "unknown verb %s; there are: %s", word, names);
+}
+
+static int run_verb(const Verb *verb, int count, char **words)
+{
+    // Some kilobytes of pointers, not on the stack.
+    Settings *settings = calloc(1, sizeof *settings);
+    if (!settings)
+        return fail(CODE_FAILED, NULL, NULL, "out of memory");
+    int code = settings_parse(settings, verb, count, words);
+    if (!code && settings->help)
+        print_verb_help(verb);
+    else if (!code)
+    {
+        rf_set_threads(settings->threads);
+        code = verb->run(settings);
+    }
+    free(settings);
+    return code;
+}
+
+static int run(int count, char **words)
+{
+    if (count < 2)
+        return fail(CODE_USAGE, NULL, NULL, "no verb; riffle --help lists them");
+    if (strcmp(words[1], "--help") == 0 || strcmp(words[1], "-h") == 0)
+    {
+        print_help(g_verbs, VERB_COUNT);
+        return CODE_DONE;
+    }
+    if (strcmp(words[1], "--version") == 0)
+    {
+        printf("riffle %s\n", rf_version());
+        return CODE_DONE;
+    }
+    for (int i = 0; i < VERB_COUNT; ++i)
+        if (strcmp(words[1], g_verbs[i].name) == 0)
+            return run_verb(&g_verbs[i], count - 2, words + 2);
+    return unknown_verb(words[1]);
+}
+
+int main(int count, char **words)
+{
+    stop_install();
+    int code = run(count, words);
+    if (code == CODE_DONE && (fflush(stdout) != 0 || ferror(stdout)))
+        code = fail(CODE_FAILED, NULL, NULL, "stdout cannot be written");
+    if (code > CODE_DONE && code < CODE_SIGNAL)
+        print_fault(wants_json(count - 1, words + 1));
+    return code;
+}

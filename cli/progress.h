@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a run is told on stderr: a bar on a terminal, plain lines, JSON events, or nothing.
+#pragma once
+
+#include "options.h"
+
+typedef struct Progress
+{
+    ProgressKind kind;
+    bool quiet, verbose;
+    /// Of the whole run, those a stopped run made before included.
+    int total, made_before;
+    int made;
+    /// Compute time of the first frame and of all behind it.
+    double first_seconds, later_seconds;
+    double started, told;
+    int last_frame;
+} Progress;
+
+double now_seconds(void);
+
+/// `made_before` of `total` frames are there already.
+void progress_begin(Progress *progress, const Settings *settings, int total, int made_before);
+/// What goes on now; only the bar shows it.
+void progress_stage(Progress *progress, const char *stage);
+/// A frame is computed and written. seconds: of computing alone.
+void progress_frame(Progress *progress, int frame, double seconds, const Stage *stages, int stage_count);
+/// Removes the bar, so that a line can be printed.
+void progress_clear(Progress *progress);
+void progress_done(Progress *progress);
+
+/// One line that is no failure. `file` may be NULL.
+__attribute__((format(printf, 3, 4))) void warn(const Settings *settings, const char *file, const char *format, ...);
+/// The same, with -v only.
+__attribute__((format(printf, 2, 3))) void tell(const Settings *settings, const char *format, ...);

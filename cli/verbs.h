@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verbs' bodies: each returns an exit code.
+#pragma once
+
+#include "options.h"
+
+int run_texture(Settings *settings);
+int run_render(Settings *settings);
+int run_convert(Settings *settings);
+int run_info(Settings *settings);
