@@ -14,8 +14,8 @@ static const RfSceneClass *const scenes[] = {
 };
 
 static const RfExemplarClass *const exemplars[] = {
-    &rf_exemplar_foam,    &rf_exemplar_bubbles, &rf_exemplar_lava,
-    &rf_exemplar_pebbles, &rf_exemplar_noise,   &rf_exemplar_checker,
+    &rf_exemplar_canes, &rf_exemplar_chocolate, &rf_exemplar_foam,  &rf_exemplar_bubbles,
+    &rf_exemplar_lava,  &rf_exemplar_pebbles,   &rf_exemplar_noise, &rf_exemplar_checker,
 };
 
 enum

@@ -33,10 +33,10 @@ struct RfCells
     int (*near)[NEAR];
 };
 
-/// x - c the short way round.
+/// x - c the short way round, for points at most half a turn outside.
 static inline float short_way(float d, float span)
 {
-    return d - span * floorf(d / span + 0.5f);
+    return d - span * (float)((d > 0.5f * span) - (d < -0.5f * span));
 }
 
 static bool has_room(const RfCells *cells, const RfCell *cell, float packing)

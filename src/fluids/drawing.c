@@ -74,15 +74,23 @@ static inline float lattice_slope(uint64_t key, int i, int j, float s, float t)
     return ways[way] * s + ways[(way + 12) & 15] * t;
 }
 
+/// floorf as an int, without a call into the mathematics library.
+static inline int floor_int(float x)
+{
+    int i = (int)x;
+    return i - (x < (float)i);
+}
+
 float rf_torus_noise(const RfTorus *torus, float x, float y, float cells, uint64_t stream)
 {
     uint64_t key = rf_hash64(torus->seed ^ (stream << 32));
-    int columns = rf_max_int(1, (int)lroundf(cells * torus->span_x));
-    int rows = rf_max_int(1, (int)lroundf(cells * torus->span_y));
+    int columns = rf_max_int(1, (int)(cells * torus->span_x + 0.5f));
+    int rows = rf_max_int(1, (int)(cells * torus->span_y + 0.5f));
     float u = x / torus->span_x * (float)columns, v = y / torus->span_y * (float)rows;
-    float fu = floorf(u), fv = floorf(v), s = u - fu, t = v - fv;
-    int i0 = rf_wrap_int((int)fu, columns), i1 = i0 + 1 < columns ? i0 + 1 : 0;
-    int j0 = rf_wrap_int((int)fv, rows), j1 = j0 + 1 < rows ? j0 + 1 : 0;
+    int iu = floor_int(u), iv = floor_int(v);
+    float s = u - (float)iu, t = v - (float)iv;
+    int i0 = rf_wrap_int(iu, columns), i1 = i0 + 1 < columns ? i0 + 1 : 0;
+    int j0 = rf_wrap_int(iv, rows), j1 = j0 + 1 < rows ? j0 + 1 : 0;
     float fade_s = s * s * s * (s * (s * 6 - 15) + 10), fade_t = t * t * t * (t * (t * 6 - 15) + 10);
     float top = rf_lerp(lattice_slope(key, i0, j0, s, t), lattice_slope(key, i1, j0, s - 1, t), fade_s);
     float bottom = rf_lerp(lattice_slope(key, i0, j1, s, t - 1), lattice_slope(key, i1, j1, s - 1, t - 1), fade_s);

@@ -21,13 +21,13 @@ static float lace(const RfCellHit *hit, float width)
 static float thickness(const Foam *foam, float x, float y)
 {
     const RfTorus *torus = &foam->torus;
-    float bx = x + 0.045f * rf_torus_octaves(torus, x, y, 4, 5, 10),
-          by = y + 0.045f * rf_torus_octaves(torus, x, y, 4, 5, 20);
+    float bx = x + 0.045f * rf_torus_octaves(torus, x, y, 4, 4, 10),
+          by = y + 0.045f * rf_torus_octaves(torus, x, y, 4, 4, 20);
     RfCellHit hole = rf_cells_at(foam->holes, bx, by, 0.012f);
     RfCellHit small = rf_cells_at(foam->small_holes, bx, by, 0.004f);
     float patch = rf_torus_octaves(torus, x, y, 5, 3, 30);
     float ragged = rf_torus_octaves(torus, x, y, 30, 2, 40);
-    float width = 0.0024f + 0.0125f * rf_smooth(-0.25f, 0.85f, patch) + 0.0024f * ragged;
+    float width = 0.0019f + 0.0120f * rf_smooth(-0.25f, 0.85f, patch) + 0.0024f * ragged;
     float coarse = lace(&hole, width);
     // The fine lace grows out of the coarse one and thins out into the holes.
     float reach =
@@ -51,8 +51,9 @@ static RfVec3 water(const Foam *foam, float x, float y)
 static void paint(const void *context, float x, float y, float *colour)
 {
     const Foam *foam = context;
-    float thick = thickness(foam, x, y), toward = thickness(foam, x - 0.0035f, y - 0.0045f);
-    float shadow = thickness(foam, x - 0.009f, y - 0.012f);
+    float thick = thickness(foam, x, y);
+    float toward = thick > 0.02f ? thickness(foam, x - 0.0035f, y - 0.0045f) : 0;
+    float shadow = thick < 0.98f ? thickness(foam, x - 0.009f, y - 0.012f) : 0;
     RfVec3 result = rf_scale3(water(foam, x, y), 1 - 0.42f * shadow * (1 - thick));
     // Tiny bubbles: dark dots, fewer where the foam is thick and dry.
     float dots = rf_torus_noise(&foam->torus, x, y, 95, 90) + 0.5f * rf_torus_noise(&foam->torus, x, y, 60, 91);
