@@ -30,7 +30,8 @@ int main(void)
     RfExemplar *exemplar = NULL;
     RfLagrangian *lagrangian = NULL;
     RfLagrangianOptions options = rf_lagrangian_defaults();
-    check(rf_image_create(512, 512, 3, &frame));
+    // The size of the river's default, or any other: the frame covers it all.
+    check(rf_image_create(512, 256, 3, &frame));
     RfImageView pixels = rf_image_view(frame);
     rf_image_set_origin(frame, RF_SAMPLE_U8, RF_ENCODING_SRGB);
 
