@@ -36,6 +36,11 @@ static bool has_extension(const char *list, const char *extension)
 
 const RfFlowFormat *rf_flow_format_find(const char *path, const uint8_t *bytes, size_t size)
 {
+    if (size == 0)
+    {
+        rf_fail(RF_BAD_INPUT, path, NULL, "the file is empty");
+        return NULL;
+    }
     for (int i = 0; i < FORMAT_COUNT; ++i)
         if (formats[i]->probe && formats[i]->probe(bytes, size))
             return formats[i];
@@ -43,10 +48,9 @@ const RfFlowFormat *rf_flow_format_find(const char *path, const uint8_t *bytes, 
     for (int i = 0; dot && dot[1] && i < FORMAT_COUNT; ++i)
         if (has_extension(formats[i]->extensions, dot + 1))
             return formats[i];
-    rf_fail(size == 0 ? RF_BAD_INPUT : RF_UNSUPPORTED, path, NULL,
-            size == 0 ? "the file is empty"
-                      : "is no 2D flow that is known: flo, npy, npz, exr, vti, nc, vec, txt (PIV), or png beside a "
-                        "json of its name");
+    rf_fail(RF_UNSUPPORTED, path, NULL,
+            "is no 2D flow that is known: flo, npy, npz, exr, vti, nc, vec, txt (PIV), or png beside a json of its "
+            "name");
     return NULL;
 }
 

@@ -1,0 +1,673 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "riffle/riffle.h"
+#include "support/files.h"
+#include "support/flow_files.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static TestFolder folder;
+static TestBytes file;
+
+static int make_folder(void **state)
+{
+    (void)state;
+    folder = test_folder_make();
+    return 0;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    test_folder_remove(&folder);
+    return 0;
+}
+
+static const char *save(const char *name)
+{
+    const char *path = test_folder_file(&folder, name);
+    assert_true(test_file_write(path, file.data, file.size));
+    return path;
+}
+
+static RfFlow *open_flow(const char *path, const RfFlowReadOptions *options)
+{
+    RfFlow *flow = NULL;
+    if (rf_flow_open(path, options, &flow) != RF_OK)
+        fail_msg("%s: %s: %s", path, rf_last_error()->place, rf_last_error()->message);
+    return flow;
+}
+
+// The first moment of a file with everything at its default.
+static RfFlow *open_first(const char *path, RfFlowView *view)
+{
+    RfFlow *flow = open_flow(path, NULL);
+    assert_int_equal(rf_flow_at(flow, rf_flow_info(flow).first_frame, view), RF_OK);
+    return flow;
+}
+
+static void assert_velocity(const RfFlowView *view, int x, int y, double u, double v)
+{
+    const float *cell = view->velocity + 2 * (y * view->width + x);
+    if (fabs((double)cell[0] - u) > 1e-5 * (fabs(u) + 1e-3) || fabs((double)cell[1] - v) > 1e-5 * (fabs(v) + 1e-3))
+        fail_msg("velocity at %d, %d is %g, %g instead of %g, %g", x, y, (double)cell[0], (double)cell[1], u, v);
+}
+
+static void assert_refused(const char *path, const RfFlowReadOptions *options, RfResult result, const char *message)
+{
+    RfFlow *flow = (RfFlow *)1;
+    assert_int_equal(rf_flow_open(path, options, &flow), result);
+    assert_null(flow);
+    assert_string_equal(rf_last_error()->file, path);
+    if (!strstr(rf_last_error()->message, message))
+        fail_msg("\"%s\" does not say \"%s\"", rf_last_error()->message, message);
+}
+
+static bool no_netcdf(void)
+{
+    RfFlow *flow;
+    file.size = 0;
+    test_bytes_add(&file, "CDF\1", 4);
+    return rf_flow_open(save("probe.nc"), NULL, &flow) == RF_UNSUPPORTED;
+}
+
+// ---- arrays ------------------------------------------------------------------------------------------------------
+
+// [2 moments][2 rows][3 columns][2], every number different and exact as a half.
+static double numbers[24];
+
+static void fill_numbers(void)
+{
+    for (int k = 0; k < 24; ++k)
+        numbers[k] = 0.5 * k - 4;
+}
+
+static void assert_second_moment(const char *path)
+{
+    RfFlow *flow = open_flow(path, NULL);
+    RfFlowView view;
+    assert_int_equal(rf_flow_info(flow).moment_count, 2);
+    assert_int_equal(rf_flow_at(flow, 1, &view), RF_OK);
+    assert_int_equal(view.width, 3);
+    assert_int_equal(view.height, 2);
+    for (int k = 0; k < 12; ++k)
+    {
+        assert_true(view.velocity[k] == (float)numbers[k]);
+        assert_true(view.next_velocity[k] == (float)numbers[12 + k]);
+    }
+    rf_flow_close(flow);
+}
+
+static void an_array_reads_the_same_in_every_width_and_byte_order(void **state)
+{
+    (void)state;
+    fill_numbers();
+    static const char *const kinds[] = {"<f2", "<f4", "<f8", ">f2", ">f4", ">f8"};
+    for (int i = 0; i < 6; ++i)
+    {
+        test_npy(&file, kinds[i], false, "2, 2, 3, 2", numbers, 24);
+        assert_second_moment(save("a.npy"));
+    }
+}
+
+static void an_array_in_fortran_order_reads_the_same(void **state)
+{
+    (void)state;
+    fill_numbers();
+    double turned[24];
+    for (int t = 0; t < 2; ++t)
+        for (int y = 0; y < 2; ++y)
+            for (int x = 0; x < 3; ++x)
+                for (int c = 0; c < 2; ++c)
+                    turned[t + 2 * (y + 2 * (x + 3 * c))] = numbers[c + 2 * (x + 3 * (y + 2 * t))];
+    test_npy(&file, "<f4", true, "2, 2, 3, 2", turned, 24);
+    assert_second_moment(save("f.npy"));
+}
+
+static void an_archive_reads_the_same_stored_and_deflated(void **state)
+{
+    (void)state;
+    fill_numbers();
+    static TestBytes other, flow;
+    test_npy(&other, "<f4", false, "4,", numbers, 4);
+    test_npy(&flow, "<f4", false, "2, 2, 3, 2", numbers, 24);
+    for (int deflated = 0; deflated < 2; ++deflated)
+    {
+        test_zip(&file, (TestZipEntry[]){{"times.npy", &other}, {"flow.npy", &flow}}, 2, deflated);
+        assert_second_moment(save("a.npz"));
+    }
+}
+
+static void an_archive_of_two_components_is_put_together(void **state)
+{
+    (void)state;
+    fill_numbers();
+    static TestBytes parts[2];
+    for (int c = 0; c < 2; ++c)
+    {
+        double half[12];
+        for (int k = 0; k < 12; ++k)
+            half[k] = numbers[2 * k + c];
+        test_npy(&parts[c], c ? ">f4" : "<f8", false, "2, 2, 3", half, 12);
+    }
+    test_zip(&file, (TestZipEntry[]){{"v.npy", &parts[1]}, {"u.npy", &parts[0]}}, 2, true);
+    assert_second_moment(save("pair.npz"));
+}
+
+static void unknown_vectors_of_middlebury_become_mask(void **state)
+{
+    (void)state;
+    test_flo(&file, 2, 1, (float[]){1, 2, 1e10f, 1e10f});
+    RfFlowView view;
+    RfFlow *flow = open_first(save("hole.flo"), &view);
+    assert_non_null(view.mask);
+    assert_int_equal(view.mask[0], 1);
+    assert_int_equal(view.mask[1], 0);
+    assert_velocity(&view, 1, 0, 0, 0);
+    rf_flow_close(flow);
+}
+
+// ---- time --------------------------------------------------------------------------------------------------------
+
+static void write_sequence(const char *format, int first, int count)
+{
+    for (int i = 0; i < count; ++i)
+    {
+        char name[64];
+        snprintf(name, sizeof name, format, first + i);
+        test_flo(&file, 1, 1, (float[]){(float)i, 0});
+        save(name);
+    }
+}
+
+static void every_step_lies_between_the_two_moments_round_it(void **state)
+{
+    (void)state;
+    write_sequence("s%03d.flo", 10, 3);
+    RfFlowReadOptions options = rf_flow_read_defaults();
+    options.moment_every = 4;
+    options.velocity_scale = 10;
+    RfFlow *flow = open_flow(test_folder_file(&folder, "s%03d.flo"), &options);
+    assert_int_equal(rf_flow_info(flow).first_frame, 10);
+    assert_int_equal(rf_flow_info(flow).last_frame, 18);
+    // Frame, moment before, moment after (-1: none); in an order that goes back as well.
+    static const int cases[][3] = {{10, 0, 1},  {11, 0, 1},  {14, 0, 1}, {15, 1, 2}, {18, 1, 2},
+                                   {19, 2, -1}, {99, 2, -1}, {12, 0, 1}, {16, 1, 2}, {5, 0, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i)
+    {
+        RfFlowView view;
+        assert_int_equal(rf_flow_at(flow, cases[i][0], &view), RF_OK);
+        assert_true(view.time == cases[i][0]);
+        assert_true(view.velocity[0] == (float)(10 * cases[i][1]));
+        assert_true(view.velocity_time == 10 + 4 * cases[i][1]);
+        assert_int_equal(view.next_velocity != NULL, cases[i][2] >= 0);
+        if (view.next_velocity)
+        {
+            assert_true(view.next_velocity[0] == (float)(10 * cases[i][2]));
+            assert_true(view.next_time == 10 + 4 * cases[i][2]);
+        }
+    }
+    rf_flow_close(flow);
+}
+
+static void a_builtin_flow_is_endless_or_steady(void **state)
+{
+    (void)state;
+    RfFlowView view;
+    RfFlow *flow = open_flow("builtin:gyre?size=32x16", NULL);
+    assert_int_equal(rf_flow_info(flow).moment_count, 0);
+    assert_int_equal(rf_flow_info(flow).first_frame, 1);
+    assert_int_equal(rf_flow_info(flow).last_frame, 100);
+    assert_int_equal(rf_flow_at(flow, 7, &view), RF_OK);
+    assert_true(view.velocity_time == 6 && view.next_time == 7 && view.next_velocity);
+    rf_flow_close(flow);
+    flow = open_first("builtin:vortex?size=16x16", &view);
+    assert_int_equal(rf_flow_info(flow).moment_count, 1);
+    assert_null(view.next_velocity);
+    rf_flow_close(flow);
+}
+
+static void moments_of_different_sizes_are_refused_by_name(void **state)
+{
+    (void)state;
+    write_sequence("d%d.flo", 1, 1);
+    test_flo(&file, 2, 1, (float[]){1, 2, 3, 4});
+    const char *second = save("d2.flo");
+    RfFlow *flow = open_flow(test_folder_file(&folder, "d%d.flo"), NULL);
+    RfFlowView view;
+    assert_int_equal(rf_flow_at(flow, 1, &view), RF_BAD_INPUT);
+    assert_string_equal(rf_last_error()->file, second);
+    assert_non_null(strstr(rf_last_error()->message, "one size"));
+    rf_flow_close(flow);
+}
+
+static void what_is_not_finite_is_refused_with_its_cell(void **state)
+{
+    (void)state;
+    test_flo(&file, 2, 2, (float[]){0, 0, 0, 0, 0, 0, 0, NAN});
+    assert_refused(save("nan.flo"), NULL, RF_BAD_INPUT, "not a finite number");
+    assert_string_equal(rf_last_error()->place, "cell 1, 1");
+}
+
+// ---- NetCDF ------------------------------------------------------------------------------------------------------
+
+static const char *const grid_names[] = {"time", "lat", "lon"};
+
+static void a_shear_over_rising_latitudes_is_turned_round_sign_and_all(void **state)
+{
+    (void)state;
+    if (no_netcdf())
+        skip();
+    // u grows northwards, v is northward; 0.5 degree rows from 59.5 to 60.5 north, 1 degree columns.
+    const double lat[] = {59.5, 60, 60.5}, lon[] = {5, 6};
+    const double u[] = {10, 10, 20, 20, 30, -99}, v[] = {3, 3, 3, 3, 3, 3};
+    const int sizes[] = {1, 3, 2};
+    const TestNcVariable variables[] = {
+        {.name = "lat", .dimension_count = 1, .dimensions = {1}, .units = "degrees_north", .values = lat},
+        {.name = "lon", .dimension_count = 1, .dimensions = {2}, .units = "degrees_east", .values = lon},
+        {.name = "a",
+         .dimension_count = 3,
+         .dimensions = {0, 1, 2},
+         .standard_name = "eastward_wind",
+         .has_fill = true,
+         .fill = -99,
+         .values = u},
+        {.name = "b", .dimension_count = 3, .dimensions = {0, 1, 2}, .standard_name = "northward_wind", .values = v}};
+    test_nc(&file, grid_names, sizes, 3, variables, 4);
+    RfFlowView view;
+    RfFlow *flow = open_first(save("shear.nc"), &view);
+    const double degree = 111200, fps = 24, to_radians = 3.14159265358979 / 180;
+    assert_velocity(&view, 0, 0, 30 / (degree * cos(60.5 * to_radians) * fps), -3 / (0.5 * degree * fps));
+    assert_velocity(&view, 0, 2, 10 / (degree * cos(59.5 * to_radians) * fps), -3 / (0.5 * degree * fps));
+    // The fill value stood in the last row of the file: now the first.
+    assert_velocity(&view, 1, 0, 0, 0);
+    assert_non_null(view.mask);
+    for (int k = 0; k < 6; ++k)
+        assert_int_equal(view.mask[k], k != 1);
+    assert_non_null(strstr(rf_flow_info(flow).conventions, "y ran up"));
+    rf_flow_close(flow);
+}
+
+static void packed_moments_over_metres_are_scaled(void **state)
+{
+    (void)state;
+    if (no_netcdf())
+        skip();
+    // Moments 1 and 2 m/s along x, 4 m cells; y falls, so the rows stay.
+    const char *const names[] = {"time", "depth", "y", "x"};
+    const int sizes[] = {2, 2, 2, 2};
+    const double y[] = {8, 4}, x[] = {0, 4};
+    const double u[] = {100, 100, 100, 100, 7, 7, 7, 7, 200, 200, 200, 200, 7, 7, 7, 7};
+    const double v[] = {0, 0, 100, 0, 7, 7, 7, 7, 0, 0, 0, -32767, 7, 7, 7, 7};
+    TestNcVariable variables[] = {
+        {.name = "y", .dimension_count = 1, .dimensions = {2}, .units = "m", .values = y},
+        {.name = "x", .dimension_count = 1, .dimensions = {3}, .units = "m", .values = x},
+        {.name = "east", .dimension_count = 4, .dimensions = {0, 1, 2, 3}, .packed = true, .scale = 0.01, .values = u},
+        {.name = "north",
+         .dimension_count = 4,
+         .dimensions = {0, 1, 2, 3},
+         .packed = true,
+         .scale = 0.01,
+         .has_fill = true,
+         .fill = -32767,
+         .values = v}};
+    test_nc(&file, names, sizes, 4, variables, 4);
+    const char *path = save("packed.nc");
+    assert_refused(path, NULL, RF_BAD_INPUT, "it has: y, x, east, north; name them with --variables");
+
+    RfFlowReadOptions options = rf_flow_read_defaults();
+    options.variables = "east,north";
+    options.fps = 10;
+    RfFlow *flow = open_flow(path, &options);
+    RfFlowView view;
+    assert_int_equal(rf_flow_info(flow).moment_count, 2);
+    assert_int_equal(rf_flow_at(flow, 0, &view), RF_OK);
+    assert_velocity(&view, 0, 0, 1 / 40.0, 0);
+    assert_velocity(&view, 0, 1, 1 / 40.0, -1 / 40.0);
+    assert_true(fabsf(view.next_velocity[0] - 2 / 40.0f) < 1e-7f);
+    assert_null(view.mask);
+    assert_int_equal(rf_flow_at(flow, 1, &view), RF_OK);
+    assert_non_null(view.mask);
+    assert_int_equal(view.mask[3], 0);
+    assert_int_equal(view.mask[2], 1);
+    rf_flow_close(flow);
+}
+
+// ---- VTK ---------------------------------------------------------------------------------------------------------
+
+static void a_plane_of_vtk_reads_the_same_in_every_coding(void **state)
+{
+    (void)state;
+    // Two rows of three; u grows upwards, v is 1 upwards.
+    const double values[] = {1, 1, 9, 1, 1, 9, 1, 1, 9, 2, 1, 9, 2, 1, 9, 3, 1, 9};
+    static const char *const codings[] = {"ascii", "binary", "raw", "base64"};
+    for (int i = 0; i < 4 * 32; ++i)
+    {
+        TestVti vti = {.width = 3,
+                       .height = 2,
+                       .depth = 1,
+                       .spacing = {0.5, 0.25},
+                       .name = i & 16 ? "U" : "velocity",
+                       .components = 3,
+                       .values = values,
+                       .coding = codings[i / 32],
+                       .type = i & 8 ? "Float64" : "Float32",
+                       .points = i & 16,
+                       .big_endian = i & 1,
+                       .wide = i & 2,
+                       .compressed = i & 4};
+        test_vti(&file, &vti);
+        RfFlowView view;
+        RfFlow *flow = open_first(save("plane.vti"), &view);
+        assert_int_equal(view.width, 3);
+        assert_int_equal(view.height, 2);
+        assert_velocity(&view, 0, 0, 2 / (0.5 * 24), -1 / (0.25 * 24));
+        assert_velocity(&view, 2, 0, 3 / (0.5 * 24), -1 / (0.25 * 24));
+        assert_velocity(&view, 1, 1, 1 / (0.5 * 24), -1 / (0.25 * 24));
+        rf_flow_close(flow);
+    }
+}
+
+static void a_volume_is_refused_with_the_remedy(void **state)
+{
+    (void)state;
+    double values[24] = {0};
+    TestVti vti = {.width = 2,
+                   .height = 2,
+                   .depth = 2,
+                   .spacing = {1, 1},
+                   .name = "vel",
+                   .components = 3,
+                   .values = values,
+                   .coding = "ascii",
+                   .type = "Float32"};
+    test_vti(&file, &vti);
+    assert_refused(save("volume.vti"), NULL, RF_BAD_INPUT, "cut one slice");
+}
+
+// ---- pictures and tables -----------------------------------------------------------------------------------------
+
+static void a_picture_beside_its_json_is_a_flow(void **state)
+{
+    (void)state;
+    RfImage *image;
+    assert_int_equal(rf_image_create(8, 8, 3, &image), RF_OK);
+    RfImageView pixels = rf_image_view(image);
+    pixels.pixels[0] = 1;
+    pixels.pixels[1] = 0.2f;
+    rf_image_set_origin(image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
+    const char *path = test_folder_file(&folder, "wind.png");
+    assert_int_equal(rf_image_write(path, image), RF_OK);
+    rf_image_destroy(image);
+    assert_refused(path, NULL, RF_BAD_INPUT, "wind.json is missing");
+
+    file.size = 0;
+    test_bytes_text(&file,
+                    "{\"note\": [{\"uMin\": 7}, \"},\\\"\"], \"uMin\": -1e1,\n\"uMax\": 30, \"vMin\":0,\"vMax\":5.0}");
+    save("wind.json");
+    RfFlowView view;
+    RfFlow *flow = open_first(path, &view);
+    assert_velocity(&view, 0, 0, 30, -1);
+    assert_velocity(&view, 1, 1, -10, 0);
+    rf_flow_close(flow);
+}
+
+static void invalid_vectors_of_insight_are_filled_and_counted(void **state)
+{
+    (void)state;
+    test_vec(&file);
+    RfFlowView view;
+    RfFlow *flow = open_first(save("piv.vec"), &view);
+    assert_int_equal(rf_flow_info(flow).filled_vectors, 1);
+    assert_int_equal(view.width, 3);
+    assert_null(view.mask);
+    for (int k = 0; k < 6; ++k)
+        assert_velocity(&view, k % 3, k / 3, 1, -0.5);
+    rf_flow_close(flow);
+}
+
+static void a_table_whose_y_falls_runs_up(void **state)
+{
+    (void)state;
+    // Two columns 8 apart, two rows 4 apart; the second vector is flagged.
+    for (int falls = 0; falls < 2; ++falls)
+    {
+        file.size = 0;
+        test_bytes_text(&file, "# x\ty\tu\tv\tmask\n");
+        for (int j = 0; j < 2; ++j)
+            for (int i = 0; i < 2; ++i)
+                test_bytes_text(&file, "%d\t%d\t%d\t4\t%d\n", 8 * i, 4 * (falls ? 1 - j : j), 8 * (j + 1),
+                                i == 1 && j == 0);
+        RfFlowView view;
+        RfFlow *flow = open_first(save("table.txt"), &view);
+        assert_velocity(&view, 0, 0, 1, falls ? -1 : 1);
+        assert_velocity(&view, 0, 1, 2, falls ? -1 : 1);
+        assert_int_equal(rf_flow_info(flow).filled_vectors, 1);
+        rf_flow_close(flow);
+    }
+}
+
+// ---- writing -----------------------------------------------------------------------------------------------------
+
+static void what_is_written_reads_back_the_same(void **state)
+{
+    (void)state;
+    float velocity[5 * 3 * 2];
+    uint8_t mask[5 * 3];
+    for (int k = 0; k < 30; ++k)
+        velocity[k] = sinf((float)k) * 3;
+    for (int k = 0; k < 15; ++k)
+        mask[k] = k % 4 != 3;
+    RfFlowView view = {.width = 5, .height = 3, .velocity = velocity, .mask = mask};
+    static const char *const names[] = {"w.flo", "w.npy", "w.exr", "w.vti"};
+    for (int i = 0; i < 4; ++i)
+    {
+        const char *path = test_folder_file(&folder, names[i]);
+        assert_int_equal(rf_flow_write(path, &view, 24), RF_OK);
+        RfFlowView back;
+        RfFlow *flow = open_first(path, &back);
+        bool masked = strstr(names[i], "vti");
+        assert_int_equal(back.width, 5);
+        assert_int_equal(back.height, 3);
+        assert_int_equal(back.mask != NULL, masked);
+        for (int k = 0; k < 15; ++k)
+        {
+            bool land = !masked && !mask[k];
+            assert_velocity(&back, k % 5, k / 5, land ? 0 : (double)velocity[2 * k],
+                            land ? 0 : (double)velocity[2 * k + 1]);
+            if (masked)
+                assert_int_equal(back.mask[k], mask[k]);
+        }
+        rf_flow_close(flow);
+    }
+    assert_int_equal(rf_flow_write(test_folder_file(&folder, "w.doc"), &view, 24), RF_UNSUPPORTED);
+}
+
+// ---- broken files ------------------------------------------------------------------------------------------------
+
+typedef struct Broken
+{
+    const char *name, *content, *message;
+} Broken;
+
+static void broken_text_is_refused_with_a_reason(void **state)
+{
+    (void)state;
+    static const Broken cases[] = {
+        {"e.flo", "", "the file is empty"},
+        {"b.flo", "PIEX1234", "does not begin with PIEH"},
+        {"s.flo", "PIEH\1\1", "ends inside the header"},
+        {"b.npy", "NUMPY", "not a NumPy array"},
+        {"b.npz", "PK\3\4 and no more of it than this", "probably cut"},
+        {"b.vec", "TITLE=\"\" VARIABLES= ZONE I=2, J=2\n1 2 3 4 1\n", "the file is cut"},
+        {"c.vec", "1 2 3 4 1\n", "no line says ZONE"},
+        {"b.txt", "# x y u v\n1 2 3\n", "four numbers"},
+        {"c.txt", "0 0 1 1\n1 5 1 1\n7 3 1 1\n2 9 1 1\n3 4 1 1\n", "no regular grid"},
+        {"b.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0\"/></VTKFile>", "six whole numbers"},
+        {"c.vti", "<VTKFile type=\"PolyData\"></VTKFile>", "holds PolyData"},
+        {"d.vti", "<!DOCTYPE a [<!ENTITY b \"c\">]><VTKFile type=\"ImageData\"/>", "document type"},
+        {"e.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 0 0\"></VTKFile>", "not XML"},
+        {"b.exr", "v/1\1", ""},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i)
+    {
+        file.size = 0;
+        test_bytes_add(&file, cases[i].content, strlen(cases[i].content));
+        assert_refused(save(cases[i].name), NULL, RF_BAD_INPUT + (strstr("c.vti d.vti", cases[i].name) != NULL),
+                       cases[i].message);
+    }
+}
+
+static void broken_numbers_are_refused_with_a_reason(void **state)
+{
+    (void)state;
+    test_npy(&file, "<f4", false, "2, 2, 3", numbers, 12);
+    assert_refused(save("c.npy"), NULL, RF_BAD_INPUT, "the shape is [2, 2, 3]");
+    test_npy(&file, "<c8", false, "2, 2, 2", numbers, 0);
+    assert_refused(save("d.npy"), NULL, RF_UNSUPPORTED, "numbers of this kind");
+    test_npy(&file, "<f4", false, "30000, 30000, 2", numbers, 4);
+    assert_refused(save("e.npy"), NULL, RF_BAD_INPUT, "needs 7200000000 bytes");
+    test_flo(&file, 2, 2, (float[8]){0});
+    file.data[7] = 0x80;
+    assert_refused(save("f.flo"), NULL, RF_BAD_INPUT, "each side must be 1 to");
+
+    static TestBytes array;
+    test_npy(&array, "<f4", false, "1, 1, 2", numbers, 2);
+    test_zip(&file, (TestZipEntry[]){{"a.npy", &array}}, 1, true);
+    file.data[14] ^= 1;
+    file.data[file.size - 22 - 51 + 16] ^= 1;
+    assert_refused(save("c.npz"), NULL, RF_BAD_INPUT, "checksum");
+    // The directory claims a gigabyte.
+    test_zip(&file, (TestZipEntry[]){{"a.npy", &array}}, 1, true);
+    file.data[file.size - 22 - 51 + 27] = 0x40;
+    assert_refused(save("d.npz"), NULL, RF_BAD_INPUT, "claims a size");
+}
+
+static void a_damaged_netcdf_is_refused(void **state)
+{
+    (void)state;
+    if (no_netcdf())
+        skip();
+    file.size = 0;
+    test_bytes_add(&file, "\x89HDF\r\n\x1a\n and nothing that HDF5 knows", 40);
+    assert_refused(save("b.nc"), NULL, RF_BAD_INPUT, "NetCDF");
+    const int sizes[] = {1, 100000, 2};
+    const TestNcVariable variable = {.name = "salt", .dimension_count = 1, .dimensions = {0}, .values = numbers};
+    test_nc(&file, grid_names, sizes, 3, &variable, 1);
+    assert_refused(
+        save("c.nc"), NULL, RF_BAD_INPUT,
+        "no velocity here: looked for u, v (also velocity_x, velocity_y; uo, vo; u10, v10; eastward_/northward_ "
+        "standard names); it has: salt; name them with --variables");
+}
+
+static void options_out_of_range_are_refused(void **state)
+{
+    (void)state;
+    RfFlow *flow;
+    RfFlowReadOptions empty = {0}, zero = rf_flow_read_defaults(), one = zero;
+    zero.fps = 0;
+    one.variables = "u";
+    assert_int_equal(rf_flow_open("builtin:vortex", &empty, &flow), RF_INVALID_ARGUMENT);
+    assert_int_equal(rf_flow_open("builtin:vortex", &zero, &flow), RF_INVALID_ARGUMENT);
+    assert_int_equal(rf_flow_open("builtin:vortex", &one, &flow), RF_INVALID_ARGUMENT);
+}
+
+// ---- real files --------------------------------------------------------------------------------------------------
+
+typedef struct Real
+{
+    const char *name, *format;
+    int width, height, moments, filled;
+} Real;
+
+static void real_files_read_with_their_known_sizes(void **state)
+{
+    (void)state;
+    static const Real cases[] = {
+        {"flows2d/mmflow_00001.flo", "flo", 50, 50, 1, 0},   {"flows2d/openpiv_karman.txt", "openpiv", 42, 15, 1, 16},
+        {"flows2d/pivpy_day2/0.vec", "vec", 41, 43, 1, 263}, {"flows2d/pivpy_day2", "vec", 41, 43, 6, 263},
+        {"flows2d/gfs_wind", "png", 360, 180, 9, 0},         {"flows2d/example_data_HIT.nc", "nc", 256, 256, 1, 0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i)
+    {
+        const char *path = test_data_file(cases[i].name);
+        if (!path)
+            skip();
+        if (strcmp(cases[i].format, "nc") == 0 && no_netcdf())
+            continue;
+        RfFlow *flow = open_flow(path, NULL);
+        RfFlowInfo info = rf_flow_info(flow);
+        assert_string_equal(info.format, cases[i].format);
+        assert_int_equal(info.width, cases[i].width);
+        assert_int_equal(info.height, cases[i].height);
+        assert_int_equal(info.moment_count, cases[i].moments);
+        assert_int_equal(info.filled_vectors, cases[i].filled);
+        rf_flow_close(flow);
+    }
+}
+
+static double divergence(const RfFlowView *view, float sign)
+{
+    double sum = 0;
+    for (int y = 1; y < view->height - 1; ++y)
+        for (int x = 1; x < view->width - 1; ++x)
+        {
+            const float *cell = view->velocity + 2 * (y * view->width + x);
+            double d = (double)(cell[2] - cell[-2] + sign * (cell[2 * view->width + 1] - cell[1 - 2 * view->width]));
+            sum += d * d;
+        }
+    return sum;
+}
+
+static void real_flows_converge_less_than_with_v_the_other_way(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"flows2d/pivpy_day2/0.vec", "flows2d/pivpy_day2/3.vec", "flows2d/gfs_wind",
+                                        "flows2d/example_data_HIT.nc"};
+    for (int i = 0; i < (no_netcdf() ? 3 : 4); ++i)
+    {
+        const char *path = test_data_file(names[i]);
+        if (!path)
+            skip();
+        RfFlowView view;
+        RfFlow *flow = open_first(path, &view);
+        assert_true(divergence(&view, 1) < 0.8 * divergence(&view, -1));
+        rf_flow_close(flow);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_array_reads_the_same_in_every_width_and_byte_order),
+        cmocka_unit_test(an_array_in_fortran_order_reads_the_same),
+        cmocka_unit_test(an_archive_reads_the_same_stored_and_deflated),
+        cmocka_unit_test(an_archive_of_two_components_is_put_together),
+        cmocka_unit_test(unknown_vectors_of_middlebury_become_mask),
+        cmocka_unit_test(every_step_lies_between_the_two_moments_round_it),
+        cmocka_unit_test(a_builtin_flow_is_endless_or_steady),
+        cmocka_unit_test(moments_of_different_sizes_are_refused_by_name),
+        cmocka_unit_test(what_is_not_finite_is_refused_with_its_cell),
+        cmocka_unit_test(a_shear_over_rising_latitudes_is_turned_round_sign_and_all),
+        cmocka_unit_test(packed_moments_over_metres_are_scaled),
+        cmocka_unit_test(a_plane_of_vtk_reads_the_same_in_every_coding),
+        cmocka_unit_test(a_volume_is_refused_with_the_remedy),
+        cmocka_unit_test(a_picture_beside_its_json_is_a_flow),
+        cmocka_unit_test(invalid_vectors_of_insight_are_filled_and_counted),
+        cmocka_unit_test(a_table_whose_y_falls_runs_up),
+        cmocka_unit_test(what_is_written_reads_back_the_same),
+        cmocka_unit_test(broken_text_is_refused_with_a_reason),
+        cmocka_unit_test(broken_numbers_are_refused_with_a_reason),
+        cmocka_unit_test(a_damaged_netcdf_is_refused),
+        cmocka_unit_test(options_out_of_range_are_refused),
+        cmocka_unit_test(real_files_read_with_their_known_sizes),
+        cmocka_unit_test(real_flows_converge_less_than_with_v_the_other_way),
+    };
+    return cmocka_run_group_tests_name("flow i/o", tests, make_folder, remove_folder);
+}
