@@ -69,12 +69,14 @@ sheet() {
 # Clouds over built-in turbulence, from above and as a relief: the blended noise is the height, the shader's colours lie
 # on it.
 clouds() {
-    local folder=$out/clouds flow="builtin:turbulence?size=512x512" n
+    local folder=$out/clouds flow="builtin:turbulence?size=256x256&speed=1" n
     rm -rf "$folder"
     mkdir -p "$folder"
     echo clouds
-    "$riffle" texture "$flow" builtin:noise "$folder/height.%04d.png" --frames 1-96 --progress none
-    "$riffle" texture "$flow" builtin:noise "$folder/frame.%04d.png" --frames 1-96 --progress none --shader clouds
+    "$riffle" texture "$flow" builtin:noise "$folder/height.%04d.png" --frames 1-96 --size 512x512 \
+        --progress none
+    "$riffle" texture "$flow" builtin:noise "$folder/frame.%04d.png" --frames 1-96 --size 512x512 \
+        --progress none --shader clouds
     "$riffle" render "$folder/frame.%04d.png" "$folder/relief.%04d.png" --as relief \
         --map "height=$folder/height.%04d.png" --displace 0.15 --progress none
     local cells=(builtin:noise)
@@ -91,15 +93,16 @@ clouds() {
 
 flows=$data/flows2d
 exemplars=$data/exemplars
-wind=(--velocity-scale 0.04 --moment-every 24 --size 720x360)
-piv=(--velocity-scale 1 --moment-every 12 --size 512x512)
-turbulence=(--size 512x512)
+# Speeds of one to four pixels a frame; the moments spread over the frames drawn.
+wind=(--velocity-scale 0.06 --moment-every 12 --size 720x360)
+piv=(--velocity-scale 1.5 --moment-every 20 --size 492x516)
+turbulence=(--velocity-scale 10 --size 512x512)
 
 # The pictures of the README.
 sheet river-foam free "builtin:river?size=512x512" builtin:foam 96
-sheet cylinder-lava free "builtin:cylinder?size=512x256" builtin:lava 96
+sheet cylinder-lava free "builtin:cylinder?size=256x128&speed=1" builtin:lava 96 --size 512x256
 sheet gyre-pebbles free "builtin:gyre?size=512x256" builtin:pebbles 96
-sheet turbulence-bubbles free "builtin:turbulence?size=512x512" builtin:bubbles 96
+sheet eddies-bubbles free "builtin:turbulence?size=256x256&speed=1" builtin:bubbles 96 --size 512x512
 clouds
 
 # Real flows: wind (public domain, ISC), particle image velocimetry (BSD), a slice of turbulence (MIT).
@@ -107,7 +110,7 @@ for flow in wind:gfs_wind piv:pivpy_day2 turbulence:example_data_HIT.nc; do
     name=${flow%%:*}
     declare -n options=$name
     sheet "$name-lava" other "$flows/${flow#*:}" "$exemplars/stk_lava.png" 96 "${options[@]}"
-    sheet "$name-foam" free "$flows/${flow#*:}" "$exemplars/aframe_water_512.jpg" 96 "${options[@]}"
+    sheet "$name-foam" free "$flows/${flow#*:}" builtin:foam 96 "${options[@]}"
     sheet "$name-grass" free "$flows/${flow#*:}" "$exemplars/skimage_grass.png" 96 "${options[@]}"
 done
 
