@@ -32,7 +32,8 @@ static void add_integer(TestBytes *bytes, uint64_t x, int size, bool big)
 {
     for (int i = 0; i < size; ++i)
     {
-        uint8_t byte = (uint8_t)(x >> 8 * (big ? size - 1 - i : i));
+        int place = big ? size - 1 - i : i;
+        uint8_t byte = place < 8 ? (uint8_t)(x >> 8 * place) : 0;
         test_bytes_add(bytes, &byte, 1);
     }
 }
