@@ -21,7 +21,9 @@ static const RfExemplarClass *const exemplars[] = {
 enum
 {
     SCENE_COUNT = sizeof scenes / sizeof scenes[0],
-    EXEMPLAR_COUNT = sizeof exemplars / sizeof exemplars[0]
+    EXEMPLAR_COUNT = sizeof exemplars / sizeof exemplars[0],
+    /// Of an exemplar.
+    MAX_ASPECT = 8
 };
 
 struct RfFlowScene
@@ -48,6 +50,17 @@ static RfResult refuse_name(const char *spec, const char *kind)
     return rf_fail(RF_BAD_INPUT, file, NULL, "there is no built-in %s of that name; there are: %s", kind, names);
 }
 
+/// Simulations and drawings bound their cost by it.
+static RfResult check_aspect(const char *spec, const RfParameters *parameters, int most)
+{
+    int shorter = rf_min_int(parameters->width, parameters->height);
+    if (most == 0 || rf_max_int(parameters->width, parameters->height) <= (int64_t)most * shorter)
+        return RF_OK;
+    char file[400];
+    snprintf(file, sizeof file, "builtin:%.380s", spec);
+    return rf_fail(RF_BAD_INPUT, file, "size", "the longer side may be %d times the shorter at the most", most);
+}
+
 RfResult rf_flow_scene_create(const char *spec, RfFlowScene **out)
 {
     RF_REQUIRE(spec && out, "a flow scene needs a name and a place to put it");
@@ -60,6 +73,7 @@ RfResult rf_flow_scene_create(const char *spec, RfFlowScene **out)
         return refuse_name(spec, "flow");
     RfParameters parameters;
     RF_TRY(rf_parameters_read(spec, class->defaults, class->ranges, &parameters));
+    RF_TRY(check_aspect(spec, &parameters, class->most_aspect));
     RfFlowScene *scene = rf_allocate_zero(1, sizeof *scene);
     if (!scene)
         return RF_OUT_OF_MEMORY;
@@ -136,6 +150,7 @@ RfResult rf_exemplar_draw(const char *spec, RfImage **out)
         return refuse_name(spec, "exemplar");
     RfParameters parameters;
     RF_TRY(rf_parameters_read(spec, class->defaults, class->ranges, &parameters));
+    RF_TRY(check_aspect(spec, &parameters, MAX_ASPECT));
     RfImage *image;
     RF_TRY(rf_image_create(parameters.width, parameters.height, class->channels, &image));
     RfImageView view = rf_image_view(image);

@@ -21,10 +21,9 @@ typedef struct RfCellHit
     float wall, round;
 } RfCellHit;
 
-/// Sites with radii from `large` down to `small` (1 / scale of the shorter side), the large ones first, none closer
-/// than `packing` times the sum of two radii; `evenness` over 0 makes small ones rarer. Fills the torus.
-RfResult rf_cells_create(const RfTorus *torus, float large, float small, float evenness, float packing, uint64_t stream,
-                         RfCells **out);
+/// Sites with radii from `large` down to `small`, the large ones first, none closer than `packing` times the sum of
+/// two radii. They fill the torus.
+RfResult rf_cells_create(const RfTorus *torus, float large, float small, float packing, uint64_t stream, RfCells **out);
 void rf_cells_destroy(RfCells *cells);
 /// The cell of a point. Corners are rounded over about `rounding`, less in small cells.
 RfCellHit rf_cells_at(const RfCells *cells, float x, float y, float rounding);

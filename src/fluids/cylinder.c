@@ -23,7 +23,7 @@ enum
     DIRECTIONS = 9,
     /// Nodes along the shorter side, and along the longer at most.
     SHORT_SIDE = 112,
-    LONG_SIDE = 640,
+    LONG_SIDE = 8 * SHORT_SIDE,
     ROWS_AN_ITEM = 8,
     /// Steps before moment 0 in units of diameter over speed.
     STARTUP = 26
@@ -321,6 +321,7 @@ const RfSceneClass rf_scene_cylinder = {
                                          {0}},
     .sentence = "Flow from left to right past a cylinder that sheds a vortex street, without end; speed is the "
                 "inflow's.",
+    .most_aspect = 8,
     .moment_count = 0,
     .create = create,
     .restart = restart,

@@ -6,12 +6,12 @@
 
 enum
 {
-    SAMPLES = 3
+    SAMPLES = 2
 };
 
 const RfParameterRange rf_drawing_ranges[] = {{"size", RF_PARAMETER_SIZE, 8, 4096},
                                               {"seed", RF_PARAMETER_INTEGER, 0, 4294967295.0},
-                                              {"scale", RF_PARAMETER_NUMBER, 0.25, 4},
+                                              {"scale", RF_PARAMETER_NUMBER, 0.5, 4},
                                               {0}};
 
 typedef struct Canvas

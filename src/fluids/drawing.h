@@ -28,7 +28,7 @@ RfTorus rf_torus(const RfParameters *parameters);
 /// Paints one point; `colour` takes the image's channels.
 typedef void RfPaintFn(const void *context, float x, float y, float *colour);
 
-/// Every pixel is the mean of 3 x 3 points, averaged as linear light (channels after the third as they are).
+/// Every pixel is the mean of 2 x 2 points, averaged as linear light (channels after the third as they are).
 void rf_paint(const RfTorus *torus, const RfImageView *image, RfPaintFn *paint, const void *context);
 
 /// Gradient noise (Perlin 2002) in about -1..1, `cells` lattice cells a unit, closed on the torus.

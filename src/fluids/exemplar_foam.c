@@ -70,9 +70,9 @@ static void paint(const void *context, float x, float y, float *colour)
 static RfResult draw(const RfParameters *parameters, const RfImageView *image)
 {
     Foam foam = {.torus = rf_torus(parameters)};
-    RfResult result = rf_cells_create(&foam.torus, 0.122f, 0.024f, 0, 0.84f, 0, &foam.holes);
+    RfResult result = rf_cells_create(&foam.torus, 0.122f, 0.024f, 0.84f, 0, &foam.holes);
     if (result == RF_OK)
-        result = rf_cells_create(&foam.torus, 0.030f, 0.010f, 0, 0.84f, 1, &foam.small_holes);
+        result = rf_cells_create(&foam.torus, 0.030f, 0.010f, 0.84f, 1, &foam.small_holes);
     if (result == RF_OK)
         rf_paint(&foam.torus, image, paint, &foam);
     rf_cells_destroy(foam.holes);

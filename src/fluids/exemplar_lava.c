@@ -90,9 +90,9 @@ static void paint(const void *context, float x, float y, float *colour)
 static RfResult draw(const RfParameters *parameters, const RfImageView *image)
 {
     Lava lava = {.torus = rf_torus(parameters)};
-    RfResult result = rf_cells_create(&lava.torus, 0.135f, 0.055f, 0, 0.85f, 0, &lava.plates);
+    RfResult result = rf_cells_create(&lava.torus, 0.135f, 0.055f, 0.85f, 0, &lava.plates);
     if (result == RF_OK)
-        result = rf_cells_create(&lava.torus, 0.050f, 0.025f, 0, 0.80f, 1, &lava.shards);
+        result = rf_cells_create(&lava.torus, 0.050f, 0.025f, 0.80f, 1, &lava.shards);
     if (result == RF_OK)
         rf_paint(&lava.torus, image, paint, &lava);
     rf_cells_destroy(lava.plates);

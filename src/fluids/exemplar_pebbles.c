@@ -120,7 +120,7 @@ static RfResult draw(const RfParameters *parameters, const RfImageView *image)
     RfResult result = RF_OK;
     for (int i = 0; i < LAYERS && result == RF_OK; ++i)
         result =
-            rf_cells_create(&pebbles.torus, layers[i].large, layers[i].small, 0, 0.80f, (uint64_t)i, &pebbles.cells[i]);
+            rf_cells_create(&pebbles.torus, layers[i].large, layers[i].small, 0.80f, (uint64_t)i, &pebbles.cells[i]);
     if (result == RF_OK)
         rf_paint(&pebbles.torus, image, paint, &pebbles);
     for (int i = 0; i < LAYERS; ++i)

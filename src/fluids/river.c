@@ -435,6 +435,7 @@ const RfSceneClass rf_scene_river = {
     .sentence =
         "A steady river from left to right between wavy banks and round islands, slower at the shores; stone=1: "
         "one round stone and no banks.",
+    .most_aspect = 16,
     .moment_count = 1,
     .create = create,
     .draw = draw,

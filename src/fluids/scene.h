@@ -14,6 +14,8 @@ typedef struct RfSceneClass
     const char *sentence;
     /// 1: steady; 0: endless.
     int moment_count;
+    /// How many times the shorter side the longer may be; 0: any number.
+    int most_aspect;
     /// Makes what the scene keeps, standing at moment 0; NULL where draw() needs the parameters only.
     RfResult (*create)(const RfParameters *parameters, void **state);
     /// Back to moment 0, and on by one moment. Both NULL where any moment can be drawn at once.

@@ -132,7 +132,7 @@ const RfSceneClass rf_scene_gyre = {
                                          {"period", RF_PARAMETER_NUMBER, 1, 1e6},
                                          {0}},
     .sentence = "The unsteady double gyre of Shadden et al. 2005: two vortices whose border swings by epsilon once a "
-                "period (in frames).",
+                "period (in frames); speed is the greatest of the first moment.",
     .moment_count = 0,
     .draw = draw_gyre,
 };

@@ -23,7 +23,7 @@
 enum
 {
     SHORT_SIDE = 128,
-    LONG_SIDE = 512
+    LONG_SIDE = 1024
 };
 
 // In waves along the shorter side: the forced band, and below it the drag.
@@ -330,6 +330,7 @@ const RfSceneClass rf_scene_turbulence = {
                                          {0}},
     .sentence = "Forced two-dimensional turbulence on a periodic domain (a Navier-Stokes run), without end; speed is "
                 "about its greatest.",
+    .most_aspect = 8,
     .moment_count = 0,
     .create = create,
     .restart = restart,
