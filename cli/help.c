@@ -15,23 +15,18 @@ enum
 static void print_wrapped(const char *text)
 {
     int column = NAME_COLUMN;
-    while (*text)
+    for (bool first = true; *text; first = false)
     {
         int length = (int)strcspn(text, " ");
-        if (column + length > LINE_WIDTH && column > NAME_COLUMN)
+        if (!first && column + 1 + length > LINE_WIDTH)
         {
             printf("\n%*s", NAME_COLUMN, "");
             column = NAME_COLUMN;
         }
-        printf("%.*s", length, text);
-        text += length;
-        column += length;
-        if (*text == ' ')
-        {
-            fputc(' ', stdout);
-            ++column;
-            ++text;
-        }
+        else if (!first)
+            column += printf(" ");
+        column += printf("%.*s", length, text);
+        text += length + strspn(text + length, " ");
     }
     fputc('\n', stdout);
 }
@@ -69,12 +64,23 @@ static void describe_range(const RfOption *option, char *text, size_t size)
         snprintf(text, size, "[%g]", option->default_value);
 }
 
+/// What stands for the value: " PX", " SECONDS", " N".
+static const char *placeholder(const RfOption *option)
+{
+    if (option->kind == RF_OPTION_BOOL)
+        return "[=yes|no]";
+    if (option->unit && strcmp(option->unit, "px") == 0)
+        return " PX";
+    if (option->unit && strcmp(option->unit, "s") == 0)
+        return " SECONDS";
+    return option->kind == RF_OPTION_FLOAT ? " X" : option->kind == RF_OPTION_CHOICE ? " " : " N";
+}
+
 static void print_method_option(const RfOption *option)
 {
-    static const char *const values[] = {" X", " N", " N", "[=yes|no]", " "};
     char name[128], text[768], range[128] = "";
     bool choice = option->kind == RF_OPTION_CHOICE;
-    snprintf(name, sizeof name, "    --%s%s%s", option->name, values[option->kind], choice ? option->choices : "");
+    snprintf(name, sizeof name, "    --%s%s%s", option->name, placeholder(option), choice ? option->choices : "");
     if (choice)
     {
         const char *at = option->choices;

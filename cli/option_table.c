@@ -309,7 +309,7 @@ static const GenericOption g_options[] = {
      set_uv},
     {"as", 0, "wheel|arrows|lic|relief", VERB_RENDER, "wheel",
      "a flow as colours, arrows or streaks; an image sequence of heights as a lit surface", set_picture},
-    {"displace", 0, "S", VERB_RENDER, "0.1", "relief: height of 1, in widths of the field, 0 to 10", set_displace},
+    {"displace", 0, "S", VERB_RENDER, "0.05", "relief: height of 1, in widths of the field, 0 to 10", set_displace},
     {"full-speed", 0, "V", VERB_RENDER, "the first frame's greatest",
      "cells a frame that get full saturation or the longest arrow", set_full_speed},
     {"seed", 0, "N", VERB_TEXTURE | VERB_RENDER, "1", "same seed and inputs: same bytes", set_seed},

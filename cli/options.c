@@ -155,7 +155,7 @@ int settings_parse(Settings *settings, const Verb *verb, int count, char **words
                            .seed = 1,
                            .moment_every = 1,
                            .frame_step = 1,
-                           .displace = 0.1,
+                           .displace = 0.05,
                            .tiling = RF_TILING_AUTO};
     settings->method = method_find("lagrangian");
     Parser parser = {.settings = settings, .count = count, .words = words};

@@ -153,9 +153,9 @@ void progress_done(Progress *progress)
         fprintf(stderr, ",\"threads\":%d}\n", rf_threads());
     }
     else if (progress->kind != PROGRESS_NONE)
-        fprintf(stderr, "%d frames in %.1f s: %.1f ms a frame to compute, the first %.1f ms; %.0f MiB, %d threads\n",
-                progress->made, now_seconds() - progress->started, 1e3 * mean, 1e3 * progress->first_seconds,
-                peak_mib(), rf_threads());
+        fprintf(stderr, "%d frame%s in %.1f s: %.1f ms a frame to compute, the first %.1f ms; %.0f MiB, %d threads\n",
+                progress->made, progress->made == 1 ? "" : "s", now_seconds() - progress->started, 1e3 * mean,
+                1e3 * progress->first_seconds, peak_mib(), rf_threads());
 }
 
 void warn(const Settings *settings, const char *file, const char *format, ...)
