@@ -260,12 +260,17 @@ static Footprint footprint(const RfWarp *warp, Jacobian j)
     float a = j.xx * j.xx + j.xy * j.xy, b = j.xx * j.yx + j.xy * j.yy, c = j.yx * j.yx + j.yy * j.yy;
     float mean = 0.5f * (a + c), spread = sqrtf(0.25f * (a - c) * (a - c) + b * b);
     float longest = sqrtf(mean + spread), shortest = sqrtf(fmaxf(mean - spread, 0));
-    float angle = 0.5f * atan2f(2 * b, a - c);
-    Footprint print = {.axis = {longest * cosf(angle), longest * sinf(angle)}};
+    Footprint print = {0};
     // One sample reaches 1.2 pixels before anything is seen to alias.
     float across = fmaxf(fmaxf(shortest, longest / MAX_TAPS), 1);
     print.taps = (int)ceilf(rf_clamp(longest / across - 0.2f, 1, MAX_TAPS));
-    print.level = (int)rf_clamp(log2f(across) + 0.5f, 0, (float)(warp->texture.level_count - 1));
+    if (across > 1)
+        print.level = (int)rf_clamp(log2f(across) + 0.5f, 0, (float)(warp->texture.level_count - 1));
+    if (print.taps > 1)
+    {
+        float angle = 0.5f * atan2f(2 * b, a - c);
+        print.axis = (RfVec2){longest * cosf(angle), longest * sinf(angle)};
+    }
     return print;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cabral, Leedom. Imaging vector fields using line integral convolution. 1993.
 //
-// Each pixel averages white noise along its streamline, followed 0.8 pixel at a time both ways by the midpoint rule,
+// Each pixel averages white noise along its streamline, followed 0.8 pixel at a time both ways,
 // under a Hann window. The average of n samples has 1/n of the noise's variance, so it is divided by the root of the
 // sum of the squared weights: the contrast stays the same whatever the length, also where a line ends at land or
 // border. Where the flow stands still the line has no length and the pixel keeps its own noise, made faint.
@@ -15,7 +15,8 @@
 
 enum
 {
-    BAND = 4
+    BAND = 4,
+    MAX_HALF_STEPS = 200
 };
 
 static const float STEP = 0.8f;
@@ -29,8 +30,9 @@ typedef struct Lic
     RfVec2 *direction;
     /// What is convolved and what comes out, interleaved: x in, y out.
     RfVec2 *grey;
-    /// Half the window's length in steps.
+    /// Half the window's length in steps, and its weights from the middle out.
     int half_steps;
+    float window[MAX_HALF_STEPS];
 } Lic;
 
 static RfVec2 direction_at(const Lic *lic, float x, float y)
@@ -59,13 +61,13 @@ static void add_sample(Sum *sum, float value, float weight)
     sum->squares += weight * weight;
 }
 
-// Follows the streamline one way; false ends it.
-static bool follow(const Lic *lic, RfVec2 *p, float step)
+// Follows the streamline one way; false ends it. *d, the direction of the last step, finds the middle of this one: half
+// the cost of the midpoint rule, and lines of this length cannot tell.
+static bool follow(const Lic *lic, RfVec2 *p, RfVec2 *d, float step)
 {
-    RfVec2 d = direction_at(lic, p->x, p->y);
-    d = direction_at(lic, p->x + 0.5f * step * d.x, p->y + 0.5f * step * d.y);
-    RfVec2 next = {p->x + step * d.x, p->y + step * d.y};
-    if (d.x * d.x + d.y * d.y < 0.5f ||
+    *d = direction_at(lic, p->x + 0.5f * step * d->x, p->y + 0.5f * step * d->y);
+    RfVec2 next = {p->x + step * d->x, p->y + step * d->y};
+    if (d->x * d->x + d->y * d->y < 0.5f ||
         !(next.x >= 0 && next.y >= 0 && next.x < (float)lic->canvas->width && next.y < (float)lic->canvas->height))
         return false;
     *p = next;
@@ -79,11 +81,10 @@ static float convolve(const Lic *lic, int x, int y)
     add_sample(&sum, lic->grey[(size_t)y * (size_t)w + (size_t)x].x, 1);
     for (int way = -1; way <= 1; way += 2)
     {
-        RfVec2 p = {(float)x + 0.5f, (float)y + 0.5f};
-        for (int i = 1; i < lic->half_steps && follow(lic, &p, (float)way * STEP); ++i)
+        RfVec2 p = {(float)x + 0.5f, (float)y + 0.5f}, d = lic->direction[(size_t)y * (size_t)w + (size_t)x];
+        for (int i = 1; i < lic->half_steps && follow(lic, &p, &d, (float)way * STEP); ++i)
         {
-            float weight = 0.5f + 0.5f * cosf(RF_PI * (float)i / (float)lic->half_steps);
-            add_sample(&sum, lic->grey[(size_t)p.y * (size_t)w + (size_t)p.x].x, weight);
+            add_sample(&sum, lic->grey[(size_t)p.y * (size_t)w + (size_t)p.x].x, lic->window[i]);
         }
     }
     // Steps are shorter than a pixel, so neighbours on the line are partly the same noise.
@@ -174,7 +175,10 @@ void rf_draw_lic(const RfFlowCanvas *canvas, RfVec2 *scratch)
 {
     Lic lic = {
         .canvas = canvas, .direction = scratch, .grey = scratch + (size_t)canvas->width * (size_t)canvas->height};
-    lic.half_steps = rf_clamp_int((int)(0.03f * (float)rf_min_int(canvas->width, canvas->height) / STEP), 24, 200);
+    lic.half_steps =
+        rf_clamp_int((int)(0.03f * (float)rf_min_int(canvas->width, canvas->height) / STEP), 24, MAX_HALF_STEPS);
+    for (int i = 0; i < lic.half_steps; ++i)
+        lic.window[i] = 0.5f + 0.5f * cosf(RF_PI * (float)i / (float)lic.half_steps);
     int bands = (canvas->height + BAND - 1) / BAND;
     start(&lic);
     rf_parallel_for(bands, convolve_band, &lic);
