@@ -555,7 +555,7 @@ static void a_damaged_netcdf_is_refused(void **state)
     if (no_netcdf())
         skip();
     file.size = 0;
-    test_bytes_add(&file, "\x89HDF\r\n\x1a\n and nothing that HDF5 knows", 40);
+    test_bytes_add(&file, "\x89HDF\r\n\x1a\n and nothing that HDF5 knows", 36);
     assert_refused(save("b.nc"), NULL, RF_BAD_INPUT, "NetCDF");
     const int sizes[] = {1, 100000, 2};
     const TestNcVariable variable = {.name = "salt", .dimension_count = 1, .dimensions = {0}, .values = numbers};

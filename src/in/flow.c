@@ -2,8 +2,8 @@
 // A 2D flow as a row of moments, wherever they come from: one file a moment, one container of many, or a built-in
 // scene. Two moments are kept, so that going forward reads each one once.
 //
-// The bytes of a container stay in memory as long as the flow is open (NetCDF is opened again for each moment instead);
-// of a sequence, only the file at hand is ever in memory.
+// Of a sequence, only the file at hand is ever in memory. NetCDF and .npy are opened again for each moment, and only
+// that moment is read; an .npz is unpacked once and stays, since deflated data cannot be entered in the middle.
 #include "in/flow_format.h"
 
 #include "core/memory.h"

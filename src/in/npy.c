@@ -4,11 +4,16 @@
 // looked for by name; nothing else of Python is understood.
 #include "in/npy.h"
 
+#include "core/memory.h"
 #include "core/result.h"
+#include "in/file.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 enum
 {
@@ -175,18 +180,116 @@ void rf_npy_copy(const RfFlowSource *source, const RfNpyHeader *header, const ui
                                                header->big_endian);
 }
 
+// A file may change between two moments.
+static RfResult check_moment(const RfFlowSource *source, const uint64_t shape[4], int moment)
+{
+    if ((uint64_t)moment < shape[0])
+        return RF_OK;
+    return rf_fail(RF_BAD_INPUT, source->path, "header", "has %llu moments now: it changed while it was read",
+                   (unsigned long long)shape[0]);
+}
+
+static void say_conventions(RfFlowMoment *out)
+{
+    snprintf(out->conventions, sizeof out->conventions, "cells a frame, y down, as in the file");
+}
+
 RfResult rf_npy_read(const RfFlowSource *source, int moment, RfFlowMoment *out)
 {
     RfNpyHeader header;
     uint64_t shape[4];
     RF_TRY(rf_npy_header(source, NULL, &header));
     RF_TRY(rf_npy_shape(source, NULL, &header, 2, shape));
+    RF_TRY(check_moment(source, shape, moment));
     RF_TRY(rf_flow_moment_create(source, (int64_t)shape[2], (int64_t)shape[1], out));
     rf_npy_copy(source, &header, shape, (uint64_t)moment, 2, out->field.velocity);
     out->moment_count = (int)shape[0];
-    snprintf(out->conventions, sizeof out->conventions, "cells a frame, y down, as in the file");
+    say_conventions(out);
     return RF_OK;
 }
 
+// ---- a file of many moments, of which one is read ------------------------------------------------------------------
+
+static RfResult read_part(int file, const char *path, uint64_t offset, void *out, size_t size)
+{
+    uint8_t *p = out;
+    while (size > 0)
+    {
+        ssize_t got = pread(file, p, size, (off_t)offset);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got <= 0)
+            return rf_fail(RF_UNREADABLE, path, NULL, "cannot be read: %s",
+                           got < 0 ? strerror(errno) : "it became shorter meanwhile");
+        p += got;
+        offset += (uint64_t)got;
+        size -= (size_t)got;
+    }
+    return RF_OK;
+}
+
+// In C order a moment is one stretch of the file.
+static RfResult read_stretch(int file, const RfFlowSource *source, const RfNpyHeader *header, const uint64_t shape[4],
+                             int moment, RfFlowMoment *out)
+{
+    RF_TRY(rf_flow_moment_create(source, (int64_t)shape[2], (int64_t)shape[1], out));
+    size_t size = (size_t)(shape[1] * shape[2] * 2) * (size_t)rf_number_size(header->kind);
+    uint8_t *bytes = rf_allocate(size, 1);
+    if (!bytes)
+        return RF_OUT_OF_MEMORY;
+    RfResult result = read_part(file, source->path, header->data_offset + (uint64_t)moment * size, bytes, size);
+    if (result == RF_OK)
+    {
+        RfNpyHeader here = *header;
+        here.data_offset = 0;
+        rf_npy_copy(&(RfFlowSource){source->path, bytes, size, source->options}, &here, shape, 0, 2,
+                    out->field.velocity);
+    }
+    rf_release(bytes);
+    out->moment_count = (int)shape[0];
+    say_conventions(out);
+    return result;
+}
+
+static RfResult read_whole(const RfFlowSource *source, int moment, RfFlowMoment *out)
+{
+    RfBytes bytes;
+    RF_TRY(rf_bytes_read(source->path, 0, &bytes));
+    RfResult result = rf_npy_read(&(RfFlowSource){source->path, bytes.data, bytes.size, source->options}, moment, out);
+    rf_bytes_free(&bytes);
+    return result;
+}
+
+static RfResult read_open_file(int file, const RfFlowSource *source, int moment, RfFlowMoment *out)
+{
+    struct stat status;
+    if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode))
+        return rf_fail(RF_UNREADABLE, source->path, NULL, "is not a regular file");
+    // The header's reader looks at no more than this, whatever size it is told.
+    uint8_t head[2 * LONGEST_HEADER] = {0};
+    RfFlowSource start = {source->path, head, (size_t)status.st_size, source->options};
+    RfNpyHeader header;
+    uint64_t shape[4];
+    RF_TRY(read_part(file, source->path, 0, head, start.size < sizeof head ? start.size : sizeof head));
+    RF_TRY(rf_npy_header(&start, NULL, &header));
+    RF_TRY(rf_npy_shape(&start, NULL, &header, 2, shape));
+    if (header.fortran_order)
+        return read_whole(source, moment, out);
+    RF_TRY(check_moment(source, shape, moment));
+    return read_stretch(file, source, &header, shape, moment, out);
+}
+
+static RfResult npy_read(const RfFlowSource *source, int moment, RfFlowMoment *out)
+{
+    if (source->bytes)
+        return rf_npy_read(source, moment, out);
+    int file = open(source->path, O_RDONLY | O_CLOEXEC);
+    if (file < 0)
+        return rf_fail(RF_UNREADABLE, source->path, NULL, "cannot be opened: %s", strerror(errno));
+    RfResult result = read_open_file(file, source, moment, out);
+    close(file);
+    return result;
+}
+
 const RfFlowFormat rf_flow_format_npy = {
-    .name = "npy", .extensions = "npy", .probe = rf_npy_probe, .read = rf_npy_read};
+    .name = "npy", .extensions = "npy", .probe = rf_npy_probe, .read = npy_read, .by_path = true};
