@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A river of foam, in 48 frames: what `riffle texture builtin:river builtin:foam river.%04d.png --frames 1-48` does.
+// A river of foam, in 24 frames: what `riffle texture builtin:river builtin:foam river.%04d.png --frames 1-24` does.
 // The lines between the marks stand in README.md, too; a test compares them.
 #include <riffle/riffle.h>
 
@@ -41,7 +41,7 @@ int main(void)
     RfMapView map = {"colour", RF_MAP_COLOUR, rf_image_view(foam), 1};
     check(rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar));
     check(rf_lagrangian_create(exemplar, &options, &lagrangian));
-    for (int n = 1; n <= 48; ++n)
+    for (int n = 1; n <= 24; ++n)
         check(rf_flow_at(flow, n, &moment) || rf_lagrangian_step(lagrangian, &moment, &pixels) ||
               rf_image_write(file_name(n), frame));
     // README ends
