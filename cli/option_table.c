@@ -97,7 +97,7 @@ static int set_double(const char *name, const char *value, double low, double hi
 static int set_int(const char *name, const char *value, int low, int high, int *out)
 {
     if (!text_to_int(value, out) || *out < low || *out > high)
-        return fail(CODE_USAGE, NULL, NULL, "--%s %s: must be %d to %d", name, value, low, high);
+        return fail(CODE_USAGE, NULL, NULL, "--%s %s: must be a whole number, %d to %d", name, value, low, high);
     return CODE_DONE;
 }
 

@@ -168,8 +168,9 @@ int settings_parse(Settings *settings, const Verb *verb, int count, char **words
 
 static int bad_range(const RfOption *option, const char *text)
 {
-    return fail(CODE_USAGE, NULL, NULL, "--%s %s: must be %.15g to %.15g%s%s", option->name, text, option->minimum,
-                option->maximum, option->unit[0] ? " " : "", option->unit);
+    return fail(CODE_USAGE, NULL, NULL, "--%s %s: must be %s%.15g to %.15g%s%s", option->name, text,
+                option->kind == RF_OPTION_FLOAT ? "" : "a whole number, ", option->minimum, option->maximum,
+                option->unit[0] ? " " : "", option->unit);
 }
 
 static int set_choice(void *field, const RfOption *option, const char *text)

@@ -13,9 +13,24 @@
 #define FLOW_KINDS "flo|npy|exr|vti"
 #define VIDEO_KINDS "mp4|webm|mov|gif"
 
+static bool is_folder(const char *path)
+{
+    struct stat status;
+    return path[strlen(path) - 1] == '/' || (stat(path, &status) == 0 && S_ISDIR(status.st_mode));
+}
+
+static int refuse_folder(const char *path, const char *extension)
+{
+    const char *slash = path[strlen(path) - 1] == '/' ? "" : "/";
+    return fail(CODE_USAGE, path, NULL, "is a directory; name the files in it: %s%sframe.%%04d.%s", path, slash,
+                extension);
+}
+
 static int find_kind(Output *output, bool flows)
 {
     const char *text = output->text;
+    if (is_folder(text))
+        return refuse_folder(text, flows ? "vti" : "png");
     if (strcmp(text, "null:") == 0)
         output->kind = OUTPUT_NULL;
     else if (strcmp(text, "md5:") == 0)
@@ -135,7 +150,7 @@ static int check_file(const Outputs *outputs, const char *path)
     if (inputs_contain(outputs->inputs, path))
         return fail(CODE_USAGE, path, NULL, "is an input of this run and is never replaced; choose another name");
     if (S_ISDIR(status.st_mode))
-        return fail(CODE_USAGE, path, NULL, "is a directory; give names in it, as %s/frame.%%04d.png", path);
+        return refuse_folder(path, "png");
     if (!outputs->replace)
         return fail(CODE_USAGE, path, NULL, "exists; -y replaces it");
     return CODE_DONE;
