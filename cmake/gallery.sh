@@ -1,22 +1,29 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Contact sheets of real and built-in inputs: gallery.sh BUILD [--docs]
+# Contact sheets of real and built-in inputs: gallery.sh BUILD [--docs] [NAME...]
 #
 # Leaves one sheet a pair of flow and exemplar in BUILD/gallery: exemplar, flow, four frames. Real inputs are taken from
 # $RIFFLE_DATA (else ../shared/data); those that are absent are left out, with a line. With --docs the sheets marked
 # `free` are also put into docs/gallery as JPEG: made from inputs that the program draws itself, or whose licence is CC0,
-# MIT, BSD, ISC or Apache or that are in the public domain.
+# MIT, BSD, ISC or Apache or that are in the public domain. With names only those sheets are made.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 build=$1
-docs=${2:-}
+shift
+docs=""
+[ "${1:-}" != --docs ] || { docs=$1; shift; }
+names=" $* "
 riffle=$build/riffle
 out=$build/gallery
 data=${RIFFLE_DATA:-../shared/data}
 largest=300000
 
 mkdir -p "$out"
+
+wanted() {
+    [ "$names" = "  " ] || [[ $names == *" $1 "* ]]
+}
 
 present() {
     [[ $1 == builtin:* || -e $1 ]] || { echo "skipped: $2: $1 is not there"; return 1; }
@@ -38,6 +45,7 @@ publish() {
 sheet() {
     local name=$1 licence=$2 flow=$3 exemplar=$4 last=$5 reading=() drawing=() folder first n
     shift 5
+    wanted "$name" || return 0
     present "$flow" "$name" && present "$exemplar" "$name" || return 0
     # What the flow is read with goes to the picture of the flow, too.
     while [ $# -gt 0 ]; do
@@ -69,6 +77,7 @@ sheet() {
 # Clouds over built-in turbulence, from above and as a relief: the blended noise is the height, the shader's colours lie
 # on it.
 clouds() {
+    wanted clouds || return 0
     local folder=$out/clouds flow="builtin:turbulence?size=256x256&speed=1" n
     rm -rf "$folder"
     mkdir -p "$folder"
@@ -77,16 +86,14 @@ clouds() {
         --progress none
     "$riffle" texture "$flow" builtin:noise "$folder/frame.%04d.png" --frames 1-96 --size 512x512 \
         --progress none --shader clouds
-    "$riffle" render "$folder/frame.%04d.png" "$folder/relief.%04d.png" --as relief \
-        --map "height=$folder/height.%04d.png" --displace 0.15 --progress none
-    local cells=(builtin:noise)
-    for n in 0001 0032 0064 0096; do
-        cells+=("$folder/frame.$n.png")
+    local above=() relief=()
+    for n in 1 32 64 96; do
+        "$riffle" render "$folder/frame.%04d.png" "$folder/relief.%04d.png" --as relief --frames $n-$n \
+            --map "height=$folder/height.%04d.png" --displace 0.15 --progress none
+        above+=("$folder/frame.$(printf %04d $n).png")
+        relief+=("$folder/relief.$(printf %04d $n).png")
     done
-    cells+=(-)
-    for n in 0001 0032 0064 0096; do
-        cells+=("$folder/relief.$n.png")
-    done
+    local cells=(builtin:noise "${above[@]}" - "${relief[@]}")
     "$build/examples/contact_sheet" "$out/clouds.png" --columns 5 --cell 256 "${cells[@]}"
     [ "$docs" != --docs ] || publish clouds
 }
