@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "in/child.h"
 #include "riffle/riffle.h"
 #include "support/files.h"
 #include "support/flow_files.h"
 
 #include <math.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -432,6 +435,19 @@ static void invalid_vectors_of_insight_are_filled_and_counted(void **state)
     rf_flow_close(flow);
 }
 
+static void millimetres_and_metres_a_second_go_by_the_frame_rate(void **state)
+{
+    (void)state;
+    file.size = 0;
+    test_bytes_text(&file, "TITLE=\"\" VARIABLES=\"X mm\", \"Y mm\", \"U m/s\", \"V m/s\", \"CHC\", ZONE I=2, J=2\n"
+                           "0,2,0.6,0.3,1\n4,2,0.6,0.3,1\n0,0,0.6,0.3,1\n4,0,0.6,0.3,1\n");
+    RfFlowView view;
+    RfFlow *flow = open_first(save("mm.vec"), &view);
+    // 600 mm/s at 24 frames a second over 4 mm, and 300 mm/s over 2 mm.
+    assert_velocity(&view, 1, 1, 600.0 / 24 / 4, -300.0 / 24 / 2);
+    rf_flow_close(flow);
+}
+
 static void a_table_whose_y_falls_runs_up(void **state)
 {
     (void)state;
@@ -566,6 +582,36 @@ static void a_damaged_netcdf_is_refused(void **state)
         "standard names); it has: salt; name them with --variables");
 }
 
+static RfResult crash(const RfFlowSource *source, int moment, RfFlowMoment *out)
+{
+    (void)source;
+    (void)moment;
+    (void)out;
+    raise(SIGSEGV);
+    return RF_OK;
+}
+
+static RfResult leave(const RfFlowSource *source, int moment, RfFlowMoment *out)
+{
+    (void)source;
+    (void)moment;
+    (void)out;
+    _exit(0);
+}
+
+static void a_library_that_dies_is_survived(void **state)
+{
+    (void)state;
+    RfFlowSource source = {.path = "bad.nc"};
+    RfFlowMoment moment = {0};
+    assert_int_equal(rf_child_read(crash, "the library", &source, 0, &moment), RF_BAD_INPUT);
+    assert_string_equal(rf_last_error()->file, "bad.nc");
+    assert_non_null(strstr(rf_last_error()->message, "the library died of it"));
+    assert_int_equal(rf_child_read(leave, "the library", &source, 0, &moment), RF_BAD_INPUT);
+    assert_non_null(strstr(rf_last_error()->message, "gave no answer"));
+    assert_null(moment.field.velocity);
+}
+
 static void options_out_of_range_are_refused(void **state)
 {
     (void)state;
@@ -660,11 +706,13 @@ int main(void)
         cmocka_unit_test(a_volume_is_refused_with_the_remedy),
         cmocka_unit_test(a_picture_beside_its_json_is_a_flow),
         cmocka_unit_test(invalid_vectors_of_insight_are_filled_and_counted),
+        cmocka_unit_test(millimetres_and_metres_a_second_go_by_the_frame_rate),
         cmocka_unit_test(a_table_whose_y_falls_runs_up),
         cmocka_unit_test(what_is_written_reads_back_the_same),
         cmocka_unit_test(broken_text_is_refused_with_a_reason),
         cmocka_unit_test(broken_numbers_are_refused_with_a_reason),
         cmocka_unit_test(a_damaged_netcdf_is_refused),
+        cmocka_unit_test(a_library_that_dies_is_survived),
         cmocka_unit_test(options_out_of_range_are_refused),
         cmocka_unit_test(real_files_read_with_their_known_sizes),
         cmocka_unit_test(real_flows_converge_less_than_with_v_the_other_way),

@@ -419,7 +419,7 @@ static RfResult mask_holes(RfFlowField *field)
     return RF_OK;
 }
 
-static void write_conventions(const Reader *reader, char text[256])
+static void write_conventions(const Reader *reader, bool holes, char text[256])
 {
     const Axis *x = &reader->x, *y = &reader->y;
     char cell[96];
@@ -430,8 +430,9 @@ static void write_conventions(const Reader *reader, char text[256])
     else
         snprintf(cell, sizeof cell, "%s over %.4g x %.4g %s cells", x->unit == AXIS_METRES ? "m/s" : "units a second",
                  x->spacing, y->spacing, x->unit == AXIS_METRES ? "m" : "unit");
-    snprintf(text, 256, "%s, at %g frames a second; %s; fill values masked", cell, (double)reader->source->options->fps,
-             y->falling ? "rows run north to south, v was negated" : "y ran up: rows and v turned round");
+    snprintf(text, 256, "%s, at %g frames a second; %s%s", cell, (double)reader->source->options->fps,
+             y->falling ? "rows run north to south, v was negated" : "y ran up: rows and v turned round",
+             holes ? "; fill values masked" : "");
 }
 
 static RfResult take_moment(const Reader *reader, int moment, RfFlowMoment *out)
@@ -450,7 +451,7 @@ static RfResult take_moment(const Reader *reader, int moment, RfFlowMoment *out)
         RF_TRY(mask_holes(&out->field));
     scale_rows(reader, &out->field);
     out->moment_count = (int)reader->moments;
-    write_conventions(reader, out->conventions);
+    write_conventions(reader, holes, out->conventions);
     return RF_OK;
 }
 
