@@ -104,6 +104,12 @@ static void make_text(void)
     file.size = 0;
     test_bytes_text(&file, "{\"a\": [1, {\"b\": \"\\\"\"}], \"uMin\": -1.5e1, \"uMax\": 2, \"vMin\": 0, \"vMax\": 1}");
     save("wind", "range");
+    file.size = 0;
+    test_bytes_text(&file, "1<VTKFile><Collection><DataSet file=\"a.vti\"/></Collection></VTKFile>");
+    save("file_list", "pvd");
+    file.size = 0;
+    test_bytes_text(&file, "0{\"v\": \"1.0\", \"files\": [{\"name\": \"a.vti\", \"time\": 0}]}");
+    save("file_list", "series");
 }
 
 int main(int argument_count, char **arguments)

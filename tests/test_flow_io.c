@@ -219,6 +219,27 @@ static void every_step_lies_between_the_two_moments_round_it(void **state)
     rf_flow_close(flow);
 }
 
+static void a_list_of_files_is_a_flow_of_as_many_moments(void **state)
+{
+    (void)state;
+    write_sequence("l%d.flo", 1, 3);
+    static const char *const lists[][2] = {
+        {"l.pvd", "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"l3.flo\"/>"
+                  "<DataSet timestep=\"1\" part=\"0\" file=\"l1.flo\"/></Collection></VTKFile>"},
+        {"l.flo.series", "{\"file-series-version\" : \"1.0\", \"files\" : [ { \"name\" : \"l3.flo\", \"time\" : 0 },"
+                         "\n{ \"time\" : 1, \"name\" : \"l1.flo\" } ] }"}};
+    for (int i = 0; i < 2; ++i)
+    {
+        file.size = 0;
+        test_bytes_add(&file, lists[i][1], strlen(lists[i][1]));
+        RfFlowView view;
+        RfFlow *flow = open_first(save(lists[i][0]), &view);
+        assert_int_equal(rf_flow_info(flow).moment_count, 2);
+        assert_true(view.velocity[0] == 2 && view.next_velocity[0] == 0);
+        rf_flow_close(flow);
+    }
+}
+
 static void a_builtin_flow_is_endless_or_steady(void **state)
 {
     (void)state;
@@ -529,6 +550,9 @@ static void broken_text_is_refused_with_a_reason(void **state)
         {"c.vti", "<VTKFile type=\"PolyData\"></VTKFile>", "holds PolyData"},
         {"d.vti", "<!DOCTYPE a [<!ENTITY b \"c\">]><VTKFile type=\"ImageData\"/>", "document type"},
         {"e.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 0 0\"></VTKFile>", "not XML"},
+        {"b.pvd", "<VTKFile><Collection></VTKFile>", "not XML"},
+        {"c.pvd", "<VTKFile/>", "names no files"},
+        {"b.series", "{\"files\": [\"a.vti\"]}", "not a JSON object"},
         {"b.exr", "v/1\1", ""},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i)
@@ -697,6 +721,7 @@ int main(void)
         cmocka_unit_test(an_archive_of_two_components_is_put_together),
         cmocka_unit_test(unknown_vectors_of_middlebury_become_mask),
         cmocka_unit_test(every_step_lies_between_the_two_moments_round_it),
+        cmocka_unit_test(a_list_of_files_is_a_flow_of_as_many_moments),
         cmocka_unit_test(a_builtin_flow_is_endless_or_steady),
         cmocka_unit_test(moments_of_different_sizes_are_refused_by_name),
         cmocka_unit_test(what_is_not_finite_is_refused_with_its_cell),

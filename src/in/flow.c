@@ -10,6 +10,7 @@
 #include "core/result.h"
 #include "fluids/builtin.h"
 #include "in/file.h"
+#include "in/file_list.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -40,7 +41,9 @@ struct RfFlow
     char variables[160];
     char path[4096];
     RfFlowScene *scene;
+    /// A file a moment: numbered, or named by a list.
     RfSequence *sequence;
+    RfFileList list;
     /// Of a container.
     RfBytes bytes;
     const RfFlowFormat *format;
@@ -108,16 +111,29 @@ static RfResult decode(RfFlow *flow, const char *path, const RfBytes *bytes, int
     return result;
 }
 
-static RfResult read_file_of_sequence(RfFlow *flow, int moment, RfFlowMoment *out)
+// 0 if the moments do not come in files of their own.
+static int file_count(const RfFlow *flow)
 {
-    const char *path = rf_sequence_path(flow->sequence, moment);
+    return flow->sequence ? rf_sequence_count(flow->sequence) : flow->list.count;
+}
+
+static const char *moment_path(const RfFlow *flow, int moment)
+{
+    if (flow->sequence)
+        return rf_sequence_path(flow->sequence, moment);
+    return flow->list.count ? flow->list.paths[moment] : flow->path;
+}
+
+static RfResult read_file_of_many(RfFlow *flow, int moment, RfFlowMoment *out)
+{
+    const char *path = moment_path(flow, moment);
     RfBytes bytes = {0};
     RF_TRY(find_format(flow, path));
     if (!flow->format->by_path)
         RF_TRY(rf_bytes_read(path, 0, &bytes));
     RfResult result = decode(flow, path, &bytes, 0, out);
     rf_bytes_free(&bytes);
-    if (result == RF_OK && out->moment_count > 1 && rf_sequence_count(flow->sequence) > 1)
+    if (result == RF_OK && out->moment_count > 1 && file_count(flow) > 1)
     {
         result = rf_fail(RF_BAD_INPUT, path, NULL, "has %d moments of its own: open it alone, not in a sequence",
                          out->moment_count);
@@ -129,18 +145,13 @@ static RfResult read_file_of_sequence(RfFlow *flow, int moment, RfFlowMoment *ou
 static RfResult read_moment(RfFlow *flow, int moment, RfFlowMoment *out)
 {
     *out = (RfFlowMoment){0};
-    if (flow->sequence)
-        return read_file_of_sequence(flow, moment, out);
+    if (file_count(flow) > 0)
+        return read_file_of_many(flow, moment, out);
     if (!flow->scene)
         return decode(flow, flow->path, &flow->bytes, moment, out);
     snprintf(out->conventions, sizeof out->conventions, "cells a frame, y down");
     out->moment_count = rf_flow_scene_moment_count(flow->scene);
     return rf_flow_scene_moment(flow->scene, moment, &out->field);
-}
-
-static const char *moment_path(const RfFlow *flow, int moment)
-{
-    return flow->sequence ? rf_sequence_path(flow->sequence, moment) : flow->path;
 }
 
 static RfResult finish_moment(const RfFlow *flow, int moment, RfFlowMoment *content)
@@ -253,6 +264,8 @@ static RfResult open_source(RfFlow *flow)
         return rf_flow_scene_create(flow->path + prefix, &flow->scene);
     if (is_directory(flow->path))
         return open_directory(flow);
+    if (rf_file_list_is(flow->path))
+        return rf_file_list_read(flow->path, &flow->list);
     if (is_file(flow->path))
         return open_single(flow);
     return rf_sequence_open(flow->path, NULL, &flow->sequence);
@@ -276,11 +289,10 @@ static RfResult count_moments(RfFlow *flow, const RfFlowMoment *first)
     RfFlowInfo *info = &flow->info;
     info->first_frame = 1;
     info->moment_count = first->moment_count;
+    if (file_count(flow) > 0)
+        info->moment_count = file_count(flow);
     if (flow->sequence)
-    {
-        info->moment_count = rf_sequence_count(flow->sequence);
         info->first_frame = rf_sequence_number(flow->sequence, 0);
-    }
     else if (info->moment_count > 1)
         info->first_frame = 0;
     int64_t last = info->moment_count < 2
@@ -350,6 +362,7 @@ void rf_flow_close(RfFlow *flow)
         rf_flow_moment_free(&flow->cache[i].content);
     rf_bytes_free(&flow->bytes);
     rf_sequence_destroy(flow->sequence);
+    rf_file_list_free(&flow->list);
     rf_flow_scene_destroy(flow->scene);
     rf_release(flow);
 }
