@@ -119,7 +119,7 @@ static void flows_are_nearly_free_of_divergence(void **state)
                   {"uniform", 1e-3},
                   {"rotation", 1e-3},
                   {"turbulence?size=128", 0.02},
-                  {"river", 0.01},
+                  {"river", 0.02},
                   {"river?stone=1&seed=3", 0.02},
                   {"cylinder?size=256x128", 0.05}};
     for (size_t k = 0; k < sizeof scenes / sizeof scenes[0]; ++k)

@@ -24,7 +24,9 @@ typedef struct Pass
 
 enum
 {
-    LINES_AN_ITEM = 16
+    LINES_AN_ITEM = 16,
+    /// Samples of a pass that takes longer than threads take to wake: about half a millisecond.
+    WORTH_THREADS = 1 << 16
 };
 
 /// Transforms lines of `from` and writes them as lines of `to`.
@@ -55,7 +57,12 @@ static void transpose_lines(void *context, int item, int worker)
 
 static void run(RfParallelFn *function, Pass pass)
 {
-    rf_parallel_for((pass.lines + LINES_AN_ITEM - 1) / LINES_AN_ITEM, function, &pass);
+    int items = (pass.lines + LINES_AN_ITEM - 1) / LINES_AN_ITEM;
+    if ((int64_t)pass.lines * pass.samples >= WORTH_THREADS)
+        rf_parallel_for(items, function, &pass);
+    else
+        for (int item = 0; item < items; ++item)
+            function(&pass, item, 0);
 }
 
 /// KissFFT takes its plans' memory from us. (For lengths with a prime factor over 5 it also asks malloc for one line.)
