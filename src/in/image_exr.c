@@ -231,7 +231,9 @@ static exr_result_t unpack(exr_decode_pipeline_t *pipeline)
     size_t pixel_bytes = 0;
     for (int c = 0; c < pipeline->channel_count; ++c)
         pixel_bytes += (size_t)pipeline->channels[c].bytes_per_element;
-    if (!from || pipeline->chunk.unpacked_size < (size_t)width * (size_t)height * pixel_bytes)
+    // Without compression the library hands out the packed bytes, of which a broken file has fewer.
+    uint64_t there = from == pipeline->packed_buffer ? pipeline->chunk.packed_size : pipeline->chunk.unpacked_size;
+    if (!from || there < (uint64_t)width * (uint64_t)height * pixel_bytes)
         return EXR_ERR_CORRUPT_CHUNK;
     for (int y = 0; y < height; ++y)
     {
