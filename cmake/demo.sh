@@ -33,7 +33,7 @@ scene() {
 scene river "builtin:river?size=512x512" 512x512 builtin:foam
 scene cylinder "builtin:cylinder?size=256x128&speed=1" 512x256 builtin:lava
 scene gyre "builtin:gyre?size=512x256" 512x256 builtin:pebbles
-scene fire "builtin:turbulence?size=256x256&speed=1" 512x512 builtin:noise --shader fire
+scene fire "builtin:turbulence?size=256x256&speed=1" 512x512 "builtin:noise?size=512&scale=2" --shader fire
 
 "$build/examples/contact_sheet" "$out/sheet.png" --columns 6 --cell 256 "${cells[@]}"
 

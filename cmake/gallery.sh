@@ -79,21 +79,22 @@ sheet() {
 clouds() {
     wanted clouds || return 0
     local folder=$out/clouds flow="builtin:turbulence?size=256x256&speed=1" n
+    local noise="builtin:noise?size=512&scale=3"
     rm -rf "$folder"
     mkdir -p "$folder"
     echo clouds
-    "$riffle" texture "$flow" builtin:noise "$folder/height.%04d.png" --frames 1-96 --size 512x512 \
+    "$riffle" texture "$flow" "$noise" "$folder/height.%04d.png" --frames 1-96 --size 512x512 \
         --progress none
-    "$riffle" texture "$flow" builtin:noise "$folder/frame.%04d.png" --frames 1-96 --size 512x512 \
+    "$riffle" texture "$flow" "$noise" "$folder/frame.%04d.png" --frames 1-96 --size 512x512 \
         --progress none --shader clouds
     local above=() relief=()
     for n in 1 32 64 96; do
         "$riffle" render "$folder/frame.%04d.png" "$folder/relief.%04d.png" --as relief --frames $n-$n \
-            --map "height=$folder/height.%04d.png" --displace 0.15 --progress none
+            --map "height=$folder/height.%04d.png" --displace 0.06 --size 512x320 --progress none
         above+=("$folder/frame.$(printf %04d $n).png")
         relief+=("$folder/relief.$(printf %04d $n).png")
     done
-    local cells=(builtin:noise "${above[@]}" - "${relief[@]}")
+    local cells=("$noise" "${above[@]}" - "${relief[@]}")
     "$build/examples/contact_sheet" "$out/clouds.png" --columns 5 --cell 256 "${cells[@]}"
     [ "$docs" != --docs ] || publish clouds
 }
