@@ -96,7 +96,7 @@ int input_kind(const char *path, bool exr_is_flow, bool png_is_flow, InputKind *
         return builtin_kind(path, kind);
     char first[4096];
     first_file(path, first, sizeof first);
-    bool flow = text_extension_in(first, "flo|npy|npz|nc|vti|vec|txt") ||
+    bool flow = text_extension_in(first, "flo|npy|npz|nc|vti|vec|txt|pvd|series") ||
                 (exr_is_flow && text_extension_in(first, "exr")) ||
                 (png_is_flow && text_extension_in(first, "png") && has_json(first));
     *kind = flow ? INPUT_FLOW : INPUT_IMAGES;

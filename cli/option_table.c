@@ -10,7 +10,9 @@
 enum
 {
     MAX_MOMENT_EVERY = 1000000,
-    MAX_THREADS = 256
+    MAX_THREADS = 256,
+    /// Of one run.
+    MAX_FRAMES = 10000000
 };
 
 static int set_output(Settings *settings, const char *value)
@@ -63,6 +65,8 @@ static int set_frames(Settings *settings, const char *value)
     }
     if (*at || last < first || step < 1)
         return bad_frames(value);
+    if (last - first >= MAX_FRAMES)
+        return fail(CODE_USAGE, NULL, NULL, "--frames %s: at most %d frames in one run", value, MAX_FRAMES);
     settings->frames_given = true;
     settings->first_frame = first;
     settings->last_frame = last;

@@ -57,6 +57,8 @@ bool outputs_idle(const Outputs *outputs);
 int outputs_write(Outputs *outputs, int frame, const RfImage *pixels, const Layout *layout, const RfImage *uv);
 /// One field to all outputs.
 int outputs_write_flow(Outputs *outputs, int frame, const RfFlowView *flow);
+/// Removes the temporary files that a killed run left beside its frames.
+void outputs_sweep(const Outputs *outputs);
 /// Encodes a frame written by an earlier run again.
 int outputs_replay(Outputs *outputs, int frame);
 /// Ends the videos; without `keep` they vanish. Reports a missing encoder. Does nothing the second time.

@@ -242,6 +242,8 @@ static int resume(Run *run, int *first)
         code = fail(code, state->path, NULL, "%s", last_fault()->message);
     state_free(state);
     run->resumed = !code;
+    if (run->resumed)
+        outputs_sweep(run->outputs);
     return code;
 }
 
