@@ -5,6 +5,7 @@
 #include "core/result.h"
 #include "fluids/scene.h"
 
+#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -14,8 +15,8 @@ static const RfSceneClass *const scenes[] = {
 };
 
 static const RfExemplarClass *const exemplars[] = {
-    &rf_exemplar_canes, &rf_exemplar_chocolate, &rf_exemplar_foam,  &rf_exemplar_bubbles,
-    &rf_exemplar_lava,  &rf_exemplar_pebbles,   &rf_exemplar_noise, &rf_exemplar_checker,
+    &rf_exemplar_foam,  &rf_exemplar_bubbles,   &rf_exemplar_lava,  &rf_exemplar_pebbles,
+    &rf_exemplar_canes, &rf_exemplar_chocolate, &rf_exemplar_noise, &rf_exemplar_checker,
 };
 
 enum
@@ -40,12 +41,12 @@ static RfResult refuse_name(const char *spec, const char *kind)
     char file[400], names[400] = "";
     snprintf(file, sizeof file, "builtin:%.380s", spec);
     int count;
-    const RfBuiltin *table = rf_builtin_table(&count);
+    const RfBuiltin *entries = rf_builtin_table(&count);
     for (int i = 0; i < count; ++i)
     {
         size_t used = strlen(names);
-        if (strcmp(table[i].kind, kind) == 0)
-            snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "", table[i].name);
+        if (strcmp(entries[i].kind, kind) == 0)
+            snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "", entries[i].name);
     }
     return rf_fail(RF_BAD_INPUT, file, NULL, "there is no built-in %s of that name; there are: %s", kind, names);
 }
@@ -165,15 +166,22 @@ RfResult rf_exemplar_draw(const char *spec, RfImage **out)
     return RF_OK;
 }
 
-const RfBuiltin *rf_builtin_table(int *count)
+// The classes are the only list; the public table is copied from them at its first use.
+static RfBuiltin table[SCENE_COUNT + EXEMPLAR_COUNT];
+static pthread_once_t table_once = PTHREAD_ONCE_INIT;
+
+static void fill_table(void)
 {
-    // Filled at every call with the same constants, a thread of its own each: the classes are the only list.
-    static _Thread_local RfBuiltin table[SCENE_COUNT + EXEMPLAR_COUNT];
     for (int i = 0; i < SCENE_COUNT; ++i)
         table[i] = (RfBuiltin){scenes[i]->name, "flow", scenes[i]->defaults, scenes[i]->sentence};
     for (int i = 0; i < EXEMPLAR_COUNT; ++i)
         table[SCENE_COUNT + i] =
             (RfBuiltin){exemplars[i]->name, "exemplar", exemplars[i]->defaults, exemplars[i]->sentence};
+}
+
+const RfBuiltin *rf_builtin_table(int *count)
+{
+    pthread_once(&table_once, fill_table);
     if (count)
         *count = SCENE_COUNT + EXEMPLAR_COUNT;
     return table;

@@ -63,7 +63,7 @@ static RfVec3 bubble(const Bubbles *bubbles, const RfCellHit *hit, float x, floa
     float ux = size > 0 ? hit->dx / size * reach : 0, uy = size > 0 ? hit->dy / size * reach : 0;
     float bend = 0.5f * reach * reach;
     RfVec3 colour = depth_colour(bubbles, x + bend * hit->dx, y + bend * hit->dy);
-    colour = rf_scale3(colour, 0.75f + 0.35f * rf_random_float(seed, 3, item, 0) + 0.22f * (0.6f * ux + 0.8f * uy));
+    colour = rf_scale3(colour, 0.90f + 0.35f * rf_random_float(seed, 3, item, 0) + 0.22f * (0.6f * ux + 0.8f * uy));
     float thickness = 1.1f * rf_random_float(seed, 3, item, 1) + 0.9f * reach + 0.25f * uy +
                       0.2f * rf_torus_noise(&bubbles->torus, x, y, 16, 20);
     return reflect(colour, ux, uy, reach, thickness);
@@ -79,7 +79,7 @@ static void paint(const void *context, float x, float y, float *colour)
     // Wet borders: a bright line in the middle, dark ones beside it.
     float width = 0.0020f + 0.014f * hit.radius;
     float beside = rf_smooth(2.6f * width, 1.2f * width, hit.round), border = rf_smooth(width, 0.2f * width, hit.round);
-    result = rf_scale3(result, 1 - 0.45f * beside * (1 - border));
+    result = rf_scale3(result, 1 - 0.36f * beside * (1 - border));
     result = rf_mix3(result, (RfVec3){0.80f, 0.88f, 0.91f}, 0.85f * border);
     colour[0] = result.x;
     colour[1] = result.y;

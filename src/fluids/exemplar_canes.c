@@ -92,7 +92,9 @@ static RfVec3 stalk_colour(const Canes *canes, int layer, const Place *place, fl
     uint64_t seed = canes->torus.seed, stream = 100 + (uint64_t)layer;
     RfVec3 a = palette[rf_random_below(6, seed, stream, place->item, 6)];
     RfVec3 b = palette[rf_random_below(6, seed, stream, place->item, 7)];
-    RfVec3 colour = rf_mix3(a, b, rf_clamp(place->along, 0, 1) * 0.6f);
+    // Each piece pales from one joint to the next; joints stand at one half.
+    float piece = place->along < 0.5f ? place->along + 0.5f : place->along - 0.5f;
+    RfVec3 colour = rf_mix3(a, b, 0.6f * piece);
     colour =
         rf_scale3(colour, 1 + 0.16f * streak(canes, x, y, 130, stream) + 0.12f * streak(canes, x, y, 50, stream + 5));
     // A joint: a dark ring with a pale, waxy band on one side.
@@ -102,7 +104,7 @@ static RfVec3 stalk_colour(const Canes *canes, int layer, const Place *place, fl
     return rf_scale3(colour, 1 - 0.65f * ring);
 }
 
-/// The leaf of a layer over the point; `near` is 0 on one, growing to 1 away from all: for shade.
+/// The topmost leaf of a layer over the point.
 static bool on_leaf(const Canes *canes, int layer, float x, float y, Place *place)
 {
     for (int k = canes->leaf_count[layer] - 1; k >= 0; --k)

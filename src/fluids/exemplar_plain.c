@@ -2,9 +2,8 @@
 // Two plain exemplars: noise for shaders and measurements, and a checker that shows every distortion.
 //
 // The noise is Gaussian with a chosen spectrum, made in the Fourier domain, so it tiles and has no lattice: amplitude
-// falls as 1 / k^1.5 (each octave of wavelengths has half the variance of the one above) from a quarter of the shorter
-// side to 3 pixels, with soft ends. It is then squeezed a little at its tails so that it stays inside 0..1 without
-// clipping.
+// falls as 1 / k^1.5 (each octave has half the variance of the coarser one) from waves of a quarter of the shorter side
+// to 3 pixels, with soft ends. It is then squeezed a little at its tails so that it stays inside 0..1 without clipping.
 #include "core/maths.h"
 #include "core/memory.h"
 #include "core/random.h"
@@ -30,7 +29,7 @@ static float noise_amplitude(float k, float low, float high)
     return rise / (1 + rise) / (1 + fall) / (k * sqrtf(k));
 }
 
-/// White noise times the amplitude, in place; returns nothing but the filtered field's real part.
+/// Modes of white noise times the amplitude, in place.
 static void filter(RfComplex *field, int width, int height, double scale)
 {
     float side = (float)rf_min_int(width, height);
