@@ -1,5 +1,6 @@
 # bench/*.c: each one program, linked against the static library and the shared scenes in tests/support.
-if(TARGET riffle_test_support)
+# With sanitizers their times would mean nothing.
+if(TARGET riffle_test_support AND NOT RIFFLE_SANITIZE)
   file(GLOB RIFFLE_BENCH_SOURCES CONFIGURE_DEPENDS bench/*.c)
 endif()
 foreach(source ${RIFFLE_BENCH_SOURCES})
