@@ -89,8 +89,8 @@ static void paint(const void *context, float x, float y, float *colour)
 static RfResult draw(const RfParameters *parameters, const RfImageView *image)
 {
     Bubbles bubbles = {.torus = rf_torus(parameters)};
-    RF_TRY(rf_cells_create(&bubbles.torus, 0.095f, 0.014f, 0.86f, 0, &bubbles.cells));
-    RfResult result = rf_cells_create(&bubbles.torus, 0.035f, 0.014f, 0.86f, 1, &bubbles.below);
+    RF_TRY(rf_cells_create(&bubbles.torus, 0.105f, 0.019f, 0.86f, 0, &bubbles.cells));
+    RfResult result = rf_cells_create(&bubbles.torus, 0.040f, 0.018f, 0.86f, 1, &bubbles.below);
     if (result == RF_OK)
         rf_paint(&bubbles.torus, image, paint, &bubbles);
     rf_cells_destroy(bubbles.cells);
