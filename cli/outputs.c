@@ -205,6 +205,8 @@ static int open_video(Outputs *outputs, Output *output, const RfImage *pixels)
     RfImageView view = rf_image_view(pixels);
     RfResult result =
         rf_video_open(output->text, view.width, view.height, (float)outputs->settings->fps, &output->video);
+    output->width = view.width;
+    output->height = view.height;
     if (result == RF_OK)
         return CODE_DONE;
     fail_result(result, output->text);
@@ -225,16 +227,22 @@ static int open_video(Outputs *outputs, Output *output, const RfImage *pixels)
     return result == RF_UNSUPPORTED && outputs->count > 1 ? CODE_DONE : CODE_FAILED;
 }
 
-static int write_video(Outputs *outputs, Output *output, const RfImage *pixels, const Layout *layout)
+static int write_video(Outputs *outputs, Output *output, int frame, const RfImage *pixels, const Layout *layout)
 {
     int code = open_video(outputs, output, pixels);
     if (code || !output->video)
         return code;
+    RfImageView view = rf_image_view(pixels);
+    if (view.width != output->width || view.height != output->height)
+        return fail(CODE_BAD_INPUT, output->text, NULL,
+                    "frame %d is %d x %d pixels, those before it %d x %d: a video has "
+                    "one size",
+                    frame, view.width, view.height, output->width, output->height);
     RfImage *colour = NULL;
     code = frame_picture(pixels, layout, output->text, &colour);
     if (code)
         return code;
-    RfImageView view = rf_image_view(colour);
+    view = rf_image_view(colour);
     RfResult result = rf_video_write(output->video, &view);
     rf_image_destroy(colour);
     return result == RF_OK ? CODE_DONE : fail_result(result, output->text);
@@ -302,7 +310,7 @@ static int write_one(Outputs *outputs, Output *output, int frame, const RfImage 
     case OUTPUT_IMAGE:
         return write_image(outputs, output, frame, pixels, layout);
     case OUTPUT_VIDEO:
-        return write_video(outputs, output, pixels, layout);
+        return write_video(outputs, output, frame, pixels, layout);
     case OUTPUT_MD5:
         return frame_md5(pixels, frame);
     case OUTPUT_STDOUT:
@@ -360,7 +368,7 @@ int outputs_replay(Outputs *outputs, int frame)
     int code = result == RF_OK ? CODE_DONE : fail_result(result, name);
     for (int i = 0; i < outputs->count && !code; ++i)
         if (outputs->list[i].kind == OUTPUT_VIDEO)
-            code = write_video(outputs, &outputs->list[i], pixels, &layout);
+            code = write_video(outputs, &outputs->list[i], frame, pixels, &layout);
     rf_image_destroy(file);
     rf_image_destroy(pixels);
     return code;

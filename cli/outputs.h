@@ -24,6 +24,8 @@ typedef struct Output
     const char *text;
     Pattern pattern;
     RfVideo *video;
+    /// Of the open video.
+    int width, height;
     /// There is no encoder: the frames go on, the run ends with this fault.
     bool without_video;
 } Output;

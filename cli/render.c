@@ -47,7 +47,9 @@ static int produce_picture(void *context, int index, int frame, bool drawn, Fram
     if (result != RF_OK)
         return fail_result(result, NULL);
     RfImageView to = rf_image_view(slot->pixels);
+    double start = now_seconds();
     result = rf_flow_picture(&view, &render->picture, &to);
+    slot->seconds = now_seconds() - start;
     return result == RF_OK ? CODE_DONE : fail_result(result, render->flow.path);
 }
 
@@ -81,7 +83,7 @@ static RfResult make_colour(const RfImageView *frame, const Layout *layout, bool
     return RF_OK;
 }
 
-/// The channel named height, else the first; `own_colours` says that there is one so named.
+/// The channel named height, else the first; `named` says which.
 static int height_channel(const Layout *layout, bool *named)
 {
     for (int m = 0; m < layout->map_count; ++m)
@@ -150,26 +152,33 @@ static int take_heights(const Render *render, int frame, Relief *relief)
     return code;
 }
 
+static int draw_relief(Render *render, const Relief *relief, FrameSlot *slot)
+{
+    RfImageView height = rf_image_view(relief->height), colour = rf_image_view(relief->colour);
+    render->width = render->width ? render->width : height.width;
+    render->height = render->height ? render->height : height.height;
+    RfResult result = make_frame(render, slot);
+    if (result != RF_OK)
+        return fail_result(result, render->images.path);
+    RfImageView to = rf_image_view(slot->pixels);
+    double start = now_seconds();
+    result = rf_render_relief(&height, &colour, (float)render->settings->displace, &to);
+    slot->seconds = now_seconds() - start;
+    return result == RF_OK ? CODE_DONE : fail_result(result, render->images.path);
+}
+
 static int produce_relief(void *context, int index, int frame, bool drawn, FrameSlot *slot)
 {
     Render *render = context;
+    if (!drawn)
+        return CODE_DONE;
     Relief relief = {0};
     bool mapped = render->heights.path != NULL;
-    int code = drawn ? read_relief(&render->images, render->indices[index], mapped, &relief) : CODE_DONE;
-    if (!code && drawn && mapped)
+    int code = read_relief(&render->images, render->indices[index], mapped, &relief);
+    if (!code && mapped)
         code = take_heights(render, frame, &relief);
-    if (!code && drawn)
-    {
-        RfImageView height = rf_image_view(relief.height), colour = rf_image_view(relief.colour);
-        render->width = render->width ? render->width : height.width;
-        render->height = render->height ? render->height : height.height;
-        RfResult result = make_frame(render, slot);
-        RfImageView to = result == RF_OK ? rf_image_view(slot->pixels) : (RfImageView){0};
-        if (result == RF_OK)
-            result = rf_render_relief(&height, &colour, (float)render->settings->displace, &to);
-        code = result == RF_OK ? CODE_DONE
-                               : fail_result(result, image_input_path(&render->images, render->indices[index]));
-    }
+    if (!code)
+        code = draw_relief(render, &relief, slot);
     relief_free(&relief);
     return code;
 }

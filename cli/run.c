@@ -68,8 +68,9 @@ static int compute(void *context)
     FrameSlot *slot = job->slot;
     double start = now_seconds();
     slot->stage_count = 0;
+    slot->seconds = 0;
     int code = job->source->produce(job->source->context, job->index, job->frame, job->drawn, slot);
-    slot->seconds = now_seconds() - start;
+    slot->busy_seconds = now_seconds() - start;
     if (code || !job->save)
         return code;
     start = now_seconds();
@@ -137,7 +138,7 @@ static int finish_frame(Run *run, int index)
                               : outputs_write(run->outputs, job->frame, slot->pixels, &slot->layout, slot->uv);
         run->written += code ? 0 : 1;
     }
-    run->busy_seconds += slot->seconds + now_seconds() - start;
+    run->busy_seconds += slot->busy_seconds + now_seconds() - start;
     if (!code && job->save)
     {
         run->saving_seconds += slot->save_seconds;

@@ -33,7 +33,8 @@ typedef struct FrameSlot
     Layout layout;
     Stage stages[MAX_STAGES];
     int stage_count;
-    double seconds;
+    /// Computing alone, as the source measures it; and all it took, reading or simulating its inputs included.
+    double seconds, busy_seconds;
     /// The source's state behind this frame, where it was asked for; from malloc by rf_free's rules.
     void *block;
     size_t block_size;

@@ -100,8 +100,10 @@ static int produce(void *context, int index, int frame, bool drawn, FrameSlot *s
     int code = flow_input_at(&texture->flow, frame, &flow);
     if (code)
         return code;
+    double start = now_seconds();
     RfResult result = drawn ? draw(texture, &flow, slot)
                             : texture->method->advance(texture->state, &flow, texture->width, texture->height);
+    slot->seconds = now_seconds() - start;
     return result == RF_OK ? CODE_DONE : fail_result(result, NULL);
 }
 

@@ -318,6 +318,37 @@ static void one_run_feeds_all_its_outputs(void **state)
     test_folder_remove(&folder);
 }
 
+static void a_video_has_one_size(void **state)
+{
+    (void)state;
+    if (!has_ffmpeg())
+    {
+        print_message("skipped: no ffmpeg\n");
+        skip();
+    }
+    TestFolder folder = test_folder_make();
+    expect(&folder, "convert builtin:foam?size=64 a.0001.png", 0);
+    expect(&folder, "convert builtin:foam?size=32 a.0002.png", 0);
+    expect_text(&folder, "convert a.%04d.png a.mp4", 3,
+                "a.mp4: frame 2 is 32 x 32 pixels, those before it 64 x 64: a video has one size\n");
+    expect(&folder, "convert a.%04d.png b.%04d.exr", 0);
+    assert_int_equal(test_folder_count(&folder), 4);
+    test_folder_remove(&folder);
+}
+
+static void frames_behind_the_flows_end_keep_its_last_velocity(void **state)
+{
+    (void)state;
+    TestFolder folder = test_folder_make();
+    expect(&folder, "convert builtin:gyre?size=64x32 g.%02d.flo --frames 3-5", 0);
+    expect_text(&folder, "convert g.%02d.flo h.%02d.flo --frames 5-7", 0, "has the frames 3 to 5");
+    assert_same_file(&folder, "g.05.flo", &folder, "h.05.flo");
+    assert_same_file(&folder, "g.05.flo", &folder, "h.07.flo");
+    expect_text(&folder, "convert g.%02d.flo i.%02d.flo --frames 6-7", 2, "has the frames 3 to 5");
+    expect_text(&folder, "convert g.%02d.flo i.%02d.flo --frames 1-7", 2, "has the frames 3 to 5");
+    test_folder_remove(&folder);
+}
+
 static void frames_are_written_even_where_there_is_no_encoder(void **state)
 {
     (void)state;
@@ -740,6 +771,8 @@ int main(void)
         cmocka_unit_test(md5_is_of_the_frames_floats),
         cmocka_unit_test(every_sth_frame_is_the_same_as_in_the_full_run),
         cmocka_unit_test(one_run_feeds_all_its_outputs),
+        cmocka_unit_test(a_video_has_one_size),
+        cmocka_unit_test(frames_behind_the_flows_end_keep_its_last_velocity),
         cmocka_unit_test(frames_are_written_even_where_there_is_no_encoder),
         cmocka_unit_test(maps_are_written_beside_png_and_together_in_exr),
         cmocka_unit_test(samples_keep_their_depth),
