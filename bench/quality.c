@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges Lagrangian texture advection on the two-vortex scene: flow error and spectrum distance over their floors,
-// flicker and contrast.
+// Judges Lagrangian texture advection on the two-vortex scene: flow error by the fine estimator and by inverse search
+// ("dis"), over the frame's own floor and over the exemplar's; spectrum distance over its floor; flicker and contrast.
+// "product" is the inverse search's ratio times the spectrum's.
 //
 //   bench_quality [EXEMPLAR] [size=256] [frames=200] [every=10] [out=FOLDER] [preset=default|paper] [label=TEXT]
 //   [OPTION=VALUE ...]
@@ -89,6 +90,14 @@ static void parse(int argc, char **argv, Settings *s)
         s->options.particle_radius = (float)s->size / 8;
 }
 
+// Sums, for ratios of means.
+static void add_error(MeasureFlowError *sum, MeasureFlowError e)
+{
+    sum->error += e.error;
+    sum->floor += e.floor;
+    sum->exemplar_floor += e.exemplar_floor;
+}
+
 int main(int argc, char **argv)
 {
     Settings s;
@@ -114,8 +123,9 @@ int main(int argc, char **argv)
     measure_grey(&pixels, exemplar_grey);
     SceneMoments scene = scene_moments(scene_two_vortices, s.size, s.size);
 
-    double error = 0, floor = 0, spectrum = 0, spectrum_floor = 0, flicker = 0, flicker_floor = 0, pop = 0,
-           contrast = 0, histogram = 0, ms = 0;
+    MeasureFlowError fine = {0}, dis = {0};
+    double spectrum = 0, spectrum_floor = 0, flicker = 0, flicker_floor = 0, pop = 0, contrast = 0, histogram = 0,
+           ms = 0;
     double layers = 0, live = 0, fading = 0, born = 0;
     int64_t holes = 0;
     int judged = 0;
@@ -145,13 +155,13 @@ int main(int argc, char **argv)
             continue;
         measure_grey(&frame, grey[1]);
         measure_displacement(&view, s.size, s.size, displacement);
-        MeasureFlowError e = measure_flow_error(grey[0], grey[1], s.size, s.size, displacement, NULL, exemplar_grey,
-                                                pixels.width, pixels.height);
+        add_error(&fine, measure_flow_error(grey[0], grey[1], s.size, s.size, displacement, NULL, exemplar_grey,
+                                            pixels.width, pixels.height));
+        add_error(&dis, measure_inverse_search_error(grey[0], grey[1], s.size, s.size, displacement, NULL,
+                                                     exemplar_grey, pixels.width, pixels.height));
         MeasureSpectrum m = measure_spectrum(grey[1], s.size, s.size, exemplar_grey, pixels.width, pixels.height);
         MeasureFlicker k = measure_flicker(grey[0], grey[1], s.size, s.size, displacement, NULL);
         MeasureContrast c = measure_contrast(&frame, NULL, &pixels);
-        error += e.error;
-        floor += e.floor > e.exemplar_floor ? e.floor : e.exemplar_floor;
         spectrum += m.distance;
         spectrum_floor += m.floor;
         flicker += k.whole;
@@ -161,12 +171,14 @@ int main(int argc, char **argv)
         histogram += c.histogram_mover;
         ++judged;
     }
-    printf("%s%s,error %.3f px,x%.2f,spectrum %.2f dB,x%.2f,product %.2f,flicker %.3f,floor %.3f,pop %.2f,contrast "
-           "%.3f,histogram %.2f,holes %lld,"
+    double spectrum_ratio = spectrum / spectrum_floor;
+    printf("%s%s,error %.3f px,x%.2f,exemplar x%.2f,dis error %.3f px,x%.2f,exemplar x%.2f,spectrum %.2f dB,x%.2f,"
+           "product %.2f,flicker %.3f,floor %.3f,pop %.2f,contrast %.3f,histogram %.2f,holes %lld,"
            "live %.0f,fading %.0f,born %.2f,layers %.2f,ms %.2f\n",
-           s.label, s.exemplar, error / judged, error / floor, spectrum / judged, spectrum / spectrum_floor,
-           error / floor * (spectrum / spectrum_floor), flicker / judged, flicker_floor / judged, pop,
-           contrast / judged, histogram / judged, (long long)holes, live, fading, born, layers, ms);
+           s.label, s.exemplar, fine.error / judged, fine.error / fine.floor, fine.error / fine.exemplar_floor,
+           dis.error / judged, dis.error / dis.floor, dis.error / dis.exemplar_floor, spectrum / judged, spectrum_ratio,
+           dis.error / dis.floor * spectrum_ratio, flicker / judged, flicker_floor / judged, pop, contrast / judged,
+           histogram / judged, (long long)holes, live, fading, born, layers, ms);
     scene_moments_free(&scene);
     rf_lagrangian_destroy(lagrangian);
     rf_exemplar_destroy(exemplar);

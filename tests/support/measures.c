@@ -152,16 +152,27 @@ static uint8_t *counted_pixels(int w, int h, const uint8_t *mask, const float *d
 
 // ---- flow error --------------------------------------------------------------------------------------------------
 
-static double end_point_error(const float *a, const float *b, int w, int h, const float *truth, const uint8_t *counted,
-                              int64_t *pixels)
+typedef void FlowEstimator(const float *a, const float *b, int w, int h, float *flow);
+
+// The frame, its true motion, the pixels that count, and who estimates.
+typedef struct FlowJudge
 {
-    size_t count = (size_t)w * (size_t)h;
+    FlowEstimator *estimator;
+    int w, h;
+    const float *truth;
+    const uint8_t *counted;
+} FlowJudge;
+
+static double end_point_error(const FlowJudge *judge, const float *a, const float *b, int64_t *pixels)
+{
+    const float *truth = judge->truth;
+    size_t count = (size_t)judge->w * (size_t)judge->h;
     float *flow = floats(2 * count);
-    measure_optical_flow(a, b, w, h, flow);
+    judge->estimator(a, b, judge->w, judge->h, flow);
     double sum = 0;
     int64_t n = 0;
     for (size_t k = 0; k < count; ++k)
-        if (counted[k])
+        if (judge->counted[k])
         {
             sum += hypot((double)(flow[2 * k] - truth[2 * k]), (double)(flow[2 * k + 1] - truth[2 * k + 1]));
             ++n;
@@ -181,23 +192,25 @@ static void fill_by_mirroring(const float *exemplar, int exemplar_w, int exempla
         }
 }
 
-MeasureFlowError measure_flow_error(const float *a, const float *b, int w, int h, const float *displacement,
-                                    const uint8_t *mask, const float *exemplar, int exemplar_w, int exemplar_h)
+static MeasureFlowError flow_error(FlowEstimator *estimator, const float *a, const float *b, int w, int h,
+                                   const float *displacement, const uint8_t *mask, const float *exemplar,
+                                   int exemplar_w, int exemplar_h)
 {
     size_t count = (size_t)w * (size_t)h;
     float *backward = floats(2 * count), *warped = floats(count), *filled = floats(count);
     uint8_t *counted = counted_pixels(w, h, mask, displacement);
+    FlowJudge judge = {estimator, w, h, displacement, counted};
     MeasureFlowError result = {0};
     measure_invert(displacement, w, h, backward);
-    result.error = end_point_error(a, b, w, h, displacement, counted, &result.pixels);
+    result.error = end_point_error(&judge, a, b, &result.pixels);
     measure_warp(a, backward, w, h, warped);
-    result.floor = end_point_error(a, warped, w, h, displacement, counted, &result.pixels);
+    result.floor = end_point_error(&judge, a, warped, &result.pixels);
     result.ratio = result.floor > 0 ? result.error / result.floor : 0;
     if (exemplar)
     {
         fill_by_mirroring(exemplar, exemplar_w, exemplar_h, w, h, filled);
         measure_warp(filled, backward, w, h, warped);
-        result.exemplar_floor = end_point_error(filled, warped, w, h, displacement, counted, &result.pixels);
+        result.exemplar_floor = end_point_error(&judge, filled, warped, &result.pixels);
         result.exemplar_ratio = result.exemplar_floor > 0 ? result.error / result.exemplar_floor : 0;
     }
     rf_release(counted);
@@ -205,6 +218,19 @@ MeasureFlowError measure_flow_error(const float *a, const float *b, int w, int h
     rf_release(warped);
     rf_release(backward);
     return result;
+}
+
+MeasureFlowError measure_flow_error(const float *a, const float *b, int w, int h, const float *displacement,
+                                    const uint8_t *mask, const float *exemplar, int exemplar_w, int exemplar_h)
+{
+    return flow_error(measure_optical_flow, a, b, w, h, displacement, mask, exemplar, exemplar_w, exemplar_h);
+}
+
+MeasureFlowError measure_inverse_search_error(const float *a, const float *b, int w, int h, const float *displacement,
+                                              const uint8_t *mask, const float *exemplar, int exemplar_w,
+                                              int exemplar_h)
+{
+    return flow_error(measure_inverse_search, a, b, w, h, displacement, mask, exemplar, exemplar_w, exemplar_h);
 }
 
 // ---- contrast ----------------------------------------------------------------------------------------------------

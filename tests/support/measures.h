@@ -26,6 +26,10 @@ void measure_warp(const float *in, const float *offset, int w, int h, float *out
 /// Dense optical flow from a to b, coarse to fine: a(x) = b(x + flow(x)). Motions up to about 8 pixels.
 void measure_optical_flow(const float *a, const float *b, int w, int h, float *flow);
 
+/// The same by dense inverse search (Kroeger and others 2016) at half resolution: an estimator of the accuracy that
+/// published work measures with, an order of magnitude coarser than the one above. At least 16 x 16 pixels.
+void measure_inverse_search(const float *a, const float *b, int w, int h, float *flow);
+
 typedef struct MeasureFlowError
 {
     /// Mean end-point error in pixels between the flow estimated from two frames and the true one.
@@ -42,6 +46,17 @@ typedef struct MeasureFlowError
 /// exemplar: grey, may be NULL; repeated by mirroring to fill the frame.
 MeasureFlowError measure_flow_error(const float *a, const float *b, int w, int h, const float *displacement,
                                     const uint8_t *mask, const float *exemplar, int exemplar_w, int exemplar_h);
+
+/// The same with measure_inverse_search, for the error and for both floors.
+///
+/// Why two: on smooth noise the estimator above is off by 0.01 pixel where nothing is wrong, which only a noise-free
+/// warp reaches, so that a method whose motion is right to 0.1 pixel is judged ten times too bad. Published work on
+/// flowing textures measures with estimators of this one's class, whose floor is near 0.1 pixel: ratios to that floor
+/// compare with its, and say whether such an estimator can tell the texture from one that truly moves. The fine one
+/// remains the sharper instrument for comparing two settings.
+MeasureFlowError measure_inverse_search_error(const float *a, const float *b, int w, int h, const float *displacement,
+                                              const uint8_t *mask, const float *exemplar, int exemplar_w,
+                                              int exemplar_h);
 
 typedef struct MeasureSpectrum
 {
