@@ -47,7 +47,7 @@ typedef struct RfLagrangianOptions
     /// reaches its limit.
     float adapt;
 
-    /// Power of the kernel weight K_p, 0.25 to 32. 1 is the paper's; larger keeps shapes by drawing one picture nearly
+    /// Power of the kernel weight K_p, 0.25 to 12. 1 is the paper's; larger keeps shapes by drawing one picture nearly
     /// everywhere.
     float sharpness;
 

@@ -23,6 +23,17 @@ static inline int rf_clamp_int(int x, int low, int high)
     return x < low ? low : x > high ? high : x;
 }
 
+/// fminf and fmaxf are calls, for the sake of NaN; these go wide. NaN in a gives b.
+static inline float rf_min(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float rf_max(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 /// NaN gives low.
 static inline float rf_clamp(float x, float low, float high)
 {

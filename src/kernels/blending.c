@@ -2,75 +2,243 @@
 // Yu, Neyret, Bruneton, Holzschuch. Spectrum-preserving texture advection for animated fluids. INRIA RR-6810, 2009,
 // section 3.3.
 //
-// A grid is 2 (n - 1)^2 triangles; over a triangle the exemplar coordinates and the vertex weights are linear. A
-// triangle is walked row by row, and a row of it is a *run* of pixels:
+// A grid is 2 (n - 1)^2 triangles; over a triangle the exemplar coordinates and the vertex weights are linear. A grid
+// is drawn into a tile in three passes, each as wide as it can be:
 //
-//     run:   first pixel, length                  the row clipped by the triangle's edges, the kernel's circle and the
-//     tile
-//            u, v, K_g, K_d at the first pixel    and their slopes along x
+//   1. Rasterise. Triangle by triangle and row by row, u, v and K_g K_d are written into three planes of the tile. Rows
+//   are short (a dozen pixels),
+//      so nothing else is done here.
+//   2. Weigh. Whole rows of the tile: w = K_p K_g K_d F, texel index and fractions.
+//   3. Sample. One pixel at a time, but four channels of two neighbouring texels at once: with a = the pair in the
+//   upper row, b = in the lower one,
 //
-// Each run is done in two passes. The first is plain arithmetic on short arrays, which the compiler makes as wide as
-// the machine: weight, texel index and fractions for all pixels. The second takes one pixel at a time, but four
-// channels of two neighbouring texels at once: with a = the pair in the upper row, b = in the lower one,
+//          r = a + fy (b - a),      sum += (w (1 - fx), w fx) * r      (the halves are added up),
 //
-//     r = a + fy (b - a),      sum += (w (1 - fx), w fx) * r      (the halves are added up)
-//
-// which is two loads and three operations a sample, with no gathers and no unpacking.
+//      which is two loads and three operations a sample, with no gathers and no unpacking.
 //
 // Edges: rows and pixels are half-open intervals of pixel centres and an edge's crossing is computed from its ends in
-// one order, so two triangles that share an edge never both draw a pixel and never both miss it.
+// one order, so two triangles that share an edge leave no gap between them. Where a grid folds over itself the later
+// triangle shows; its quality is 0 there.
 //
-// Minification: J maps exemplar to frame. The level follows sqrt |det J|; what remains along the compressed axis is
-// averaged by up to four taps, whose variance is that of a box as wide as the footprint, less what one bilinear sample
-// already averages. Both are constant over a triangle: neighbours differ a little in blur, which did not show.
+// Minification: the mean deformation of the grid chooses the texture level (by area) and, along its compressed axis, up
+// to four taps, whose variance is that of a box as wide as the footprint, less what a sample already averages. One
+// filter a grid: a filter a triangle would change sharpness at inner edges, and grids are retired long before their
+// parts differ much.
 
 #include "kernels/blending.h"
 #include "core/maths.h"
+#include "core/result.h"
 #include "core/simd.h"
+#include "kernels/extrapolation.h"
 
-#include <assert.h>
 #include <string.h>
 
 typedef float Vec4 __attribute__((vector_size(16), aligned(4), may_alias));
 typedef float Vec8 __attribute__((vector_size(32), aligned(4), may_alias));
 
 // A footprint is left to one sample up to this compression: the top of the band is mostly empty.
-#define FREE_COMPRESSION 1.25f
+#define FREE_COMPRESSION 1.5f
 
 enum
 {
-    MAX_TAPS = 4
+    MAX_TAPS = 4,
+    WIDE = 16,
+    TILE_PIXELS = RF_TILE_SPAN * RF_TILE_SPAN
 };
 
-typedef struct Triangle
+RfResult rf_tile_create(int quads, RfArena *arena, RfTileSums *out)
 {
-    // Corners in tile pixels, sorted by y, then x.
-    RfVec2 a, b, c;
-    // Value at pixel centre (0.5, 0.5) of the tile and slopes, for u, v, K_g, K_d.
-    float base[4], dx[4], dy[4];
-    int level, taps;
-    // From tap to tap, in exemplar pixels.
-    RfVec2 tap_step;
-} Triangle;
-
-typedef struct Run
-{
-    const RfDrawJob *job;
-    const RfDrawGrid *grid;
-    const Triangle *triangle;
-    int first, y, count;
-    float u, v, border, quality;
-    float centre_x, dy2, inverse_radius;
-} Run;
+    out->colour = rf_arena_push(arena, (size_t)quads * TILE_PIXELS * 4, sizeof(float));
+    out->weight = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
+    out->weight2 = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
+    out->level = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
+    out->planes = rf_arena_push(arena, 1, sizeof *out->planes);
+    if (!out->colour || !out->weight || !out->weight2 || !out->level || !out->planes)
+        return RF_OUT_OF_MEMORY;
+    memset(out->planes->weight, 0, sizeof out->planes->weight);
+    rf_tile_clear(out, quads);
+    return RF_OK;
+}
 
 void rf_tile_clear(RfTileSums *sums, int quads)
 {
-    size_t pixels = (size_t)RF_TILE_SPAN * RF_TILE_SPAN;
-    memset(sums->colour, 0, (size_t)quads * pixels * 4 * sizeof(float));
-    memset(sums->weight, 0, pixels * sizeof(float));
-    memset(sums->weight2, 0, pixels * sizeof(float));
-    memset(sums->level, 0, pixels * sizeof(float));
+    memset(sums->colour, 0, (size_t)quads * TILE_PIXELS * 4 * sizeof(float));
+    memset(sums->weight, 0, TILE_PIXELS * sizeof(float));
+    memset(sums->weight2, 0, TILE_PIXELS * sizeof(float));
+    memset(sums->level, 0, TILE_PIXELS * sizeof(float));
 }
+
+// Columns of each row that a grid has written to.
+typedef struct Extent
+{
+    int first[RF_TILE_SPAN], end[RF_TILE_SPAN];
+} Extent;
+
+typedef struct Filter
+{
+    int level, taps;
+    // From tap to tap, in exemplar pixels.
+    RfVec2 step;
+} Filter;
+
+// A tile's pixels of one row, ready to be sampled.
+typedef struct Row
+{
+    int first, end;
+    float weight[RF_TILE_PITCH], fx[RF_TILE_PITCH], fy[RF_TILE_PITCH];
+    int index[RF_TILE_PITCH];
+} Row;
+
+// The part of the tile that the kernel's circle can reach, in tile pixels.
+typedef struct Region
+{
+    float x0, y0, x1, y1;
+} Region;
+
+RF_WIDE_BODY Region region_of(const RfDrawJob *job, const RfDrawGrid *grid)
+{
+    float inverse = 1 / job->spacing, radius = grid->radius * inverse;
+    float cx = (grid->centre.x - job->origin.x) * inverse, cy = (grid->centre.y - job->origin.y) * inverse;
+    return (Region){rf_max(cx - radius, 0), rf_max(cy - radius, 0), rf_min(cx + radius, (float)job->width),
+                    rf_min(cy + radius, (float)job->height)};
+}
+
+// ---- rasterising
+
+typedef struct Corner
+{
+    float x, y, value[4]; // u, v, K_g, K_d
+} Corner;
+
+// A grid's vertices in tile pixels, and on which sides of the region they lie.
+typedef struct Vertices
+{
+    float x[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES], y[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES];
+    uint8_t outside[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES];
+} Vertices;
+
+RF_WIDE_BODY void place_vertices(const RfDrawJob *job, const RfDrawGrid *grid, const Region *region, Vertices *vertices)
+{
+    float inverse = 1 / job->spacing;
+    int count = grid->n * grid->n;
+#pragma omp simd
+    for (int k = 0; k < count; ++k)
+    {
+        float x = (grid->x[k] - job->origin.x) * inverse, y = (grid->y[k] - job->origin.y) * inverse;
+        vertices->x[k] = x;
+        vertices->y[k] = y;
+        vertices->outside[k] = (uint8_t)((x < region->x0 ? 1 : 0) | (x > region->x1 ? 2 : 0) |
+                                         (y < region->y0 ? 4 : 0) | (y > region->y1 ? 8 : 0));
+    }
+}
+
+RF_WIDE_BODY Corner corner_of(const RfDrawGrid *grid, const Vertices *vertices, int i, int j)
+{
+    int k = j * grid->n + i;
+    bool border = i == 0 || j == 0 || i == grid->n - 1 || j == grid->n - 1;
+    return (Corner){
+        vertices->x[k],
+        vertices->y[k],
+        {grid->u0 + (float)i * grid->cell, grid->v0 + (float)j * grid->cell, border ? 0.0f : 1.0f, grid->quality[k]}};
+}
+
+RF_WIDE_BODY bool is_above(const Corner *p, const Corner *q)
+{
+    return p->y < q->y || (p->y == q->y && p->x < q->x);
+}
+
+// Writes `count` pixels from (first, y); base and dx hold the four values there and their slopes along x.
+RF_WIDE_BODY void write_pixels(RfTilePlanes *planes, int place, int count, const float base[4], const float dx[4])
+{
+    float *restrict u = planes->u + place, *restrict v = planes->v + place, *restrict weight = planes->weight + place;
+    float u0 = base[0], v0 = base[1], g0 = base[2], q0 = base[3], du = dx[0], dv = dx[1], dg = dx[2], dq = dx[3];
+    for (int block = 0; block < count; block += WIDE)
+#pragma omp simd
+        for (int k = block; k < block + WIDE; ++k)
+        {
+            float along = (float)k;
+            float g = rf_min(rf_max(g0 + along * dg, 0), 1), q = rf_min(rf_max(q0 + along * dq, 0), 1);
+            if (k < count)
+            {
+                u[k] = u0 + along * du;
+                v[k] = v0 + along * dv;
+                weight[k] = g * q;
+            }
+        }
+}
+
+RF_WIDE_BODY float slope_of(const Corner *p, const Corner *q)
+{
+    return q->y > p->y ? (q->x - p->x) / (q->y - p->y) : 0;
+}
+
+RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, const Corner *q, const Corner *r,
+                                     RfTilePlanes *planes, Extent *extent)
+{
+    // a, b, c from top to bottom.
+    const Corner *a = p, *b = q, *c = r, *swap;
+    if (is_above(b, a))
+        swap = a, a = b, b = swap;
+    if (is_above(c, b))
+        swap = b, b = c, c = swap;
+    if (is_above(b, a))
+        swap = a, a = b, b = swap;
+    float abx = b->x - a->x, aby = b->y - a->y, acx = c->x - a->x, acy = c->y - a->y, det = abx * acy - aby * acx;
+    if (!(det > 1e-6f || det < -1e-6f))
+        return;
+    float dx[4], dy[4], start[4], inverse = 1 / det;
+    for (int k = 0; k < 4; ++k)
+    {
+        float ab = b->value[k] - a->value[k], ac = c->value[k] - a->value[k];
+        dx[k] = (ab * acy - ac * aby) * inverse;
+        dy[k] = (ac * abx - ab * acx) * inverse;
+        start[k] = a->value[k] + (0.5f - a->x) * dx[k] + (0.5f - a->y) * dy[k];
+    }
+    float slope_ac = slope_of(a, c), slope_ab = slope_of(a, b), slope_bc = slope_of(b, c);
+    int first_row = (int)ceilf(rf_max(a->y, region->y0) - 0.5f), end_row = (int)ceilf(rf_min(c->y, region->y1) - 0.5f);
+    for (int y = first_row; y < end_row; ++y)
+    {
+        float yc = (float)y + 0.5f, along = a->x + (yc - a->y) * slope_ac;
+        float other = yc < b->y ? a->x + (yc - a->y) * slope_ab : b->x + (yc - b->y) * slope_bc;
+        int first = (int)ceilf(rf_max(rf_min(along, other), region->x0) - 0.5f);
+        int end = (int)ceilf(rf_min(rf_max(along, other), region->x1) - 0.5f);
+        if (end <= first)
+            continue;
+        float base[4];
+        for (int k = 0; k < 4; ++k)
+            base[k] = start[k] + (float)first * dx[k] + (float)y * dy[k];
+        write_pixels(planes, y * RF_TILE_PITCH + first, end - first, base, dx);
+        extent->first[y] = rf_min_int(extent->first[y], first);
+        extent->end[y] = rf_max_int(extent->end[y], end);
+    }
+}
+
+RF_WIDE_BODY void rasterise(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, Extent *extent)
+{
+    assert(job->width <= RF_TILE_SPAN && job->height <= RF_TILE_SPAN);
+    for (int y = 0; y < RF_TILE_SPAN; ++y)
+    {
+        extent->first[y] = RF_TILE_SPAN;
+        extent->end[y] = 0;
+    }
+    Region region = region_of(job, grid);
+    Vertices vertices;
+    place_vertices(job, grid, &region, &vertices);
+    const uint8_t *outside = vertices.outside;
+    for (int j = 0; j + 1 < grid->n; ++j)
+        for (int i = 0; i + 1 < grid->n; ++i)
+        {
+            int k = j * grid->n + i;
+            if (outside[k] & outside[k + 1] & outside[k + grid->n] & outside[k + grid->n + 1])
+                continue;
+            Corner a = corner_of(grid, &vertices, i, j), b = corner_of(grid, &vertices, i + 1, j);
+            Corner c = corner_of(grid, &vertices, i, j + 1), d = corner_of(grid, &vertices, i + 1, j + 1);
+            rasterise_triangle(&region, &a, &b, &c, planes, extent);
+            rasterise_triangle(&region, &d, &c, &b, planes, extent);
+        }
+}
+
+// ---- weighing
 
 // log2 and exp2 to about 1e-4, in operations that go wide: only weights are made of them.
 RF_WIDE_BODY float fast_log2(float x)
@@ -88,7 +256,7 @@ RF_WIDE_BODY float fast_log2(float x)
 
 RF_WIDE_BODY float fast_exp2(float x)
 {
-    x = x < -126 ? -126 : x;
+    x = rf_max(x, -126);
     float whole = floorf(x), t = x - whole;
     union
     {
@@ -98,223 +266,129 @@ RF_WIDE_BODY float fast_exp2(float x)
     return bits.f * (1 + t * (0.6951786f + t * (0.2276141f + t * 0.0772073f)));
 }
 
-// Crossing of the edge p-q (p above q) with the row's centre line.
-RF_WIDE_BODY float edge_x(RfVec2 p, RfVec2 q, float y)
+RF_WIDE_BODY float kernel_power(float kernel, float sharpness, int power)
 {
-    return p.x + (y - p.y) * ((q.x - p.x) / (q.y - p.y));
+    if (power == 1)
+        return kernel;
+    if (power == 2)
+        return kernel * kernel;
+    return kernel > 0 ? fast_exp2(sharpness * fast_log2(rf_max(kernel, 1e-6f))) : 0;
 }
 
-RF_WIDE_BODY void sort_corners(Triangle *t)
+// w = K_p K_g K_d F over a row. `power` is a constant at every call.
+RF_WIDE_BODY void weigh_row_with(const RfDrawJob *job, const RfDrawGrid *grid, float *restrict plane, int y, Row *row,
+                                 int power)
 {
-#define RF_ABOVE(p, q) ((p).y < (q).y || ((p).y == (q).y && (p).x < (q).x))
-#define RF_SWAP(p, q)                                                                                                  \
-    do                                                                                                                 \
-    {                                                                                                                  \
-        RfVec2 swap_ = p;                                                                                              \
-        p = q;                                                                                                         \
-        q = swap_;                                                                                                     \
-    } while (0)
-    if (RF_ABOVE(t->b, t->a))
-        RF_SWAP(t->a, t->b);
-    if (RF_ABOVE(t->c, t->b))
-        RF_SWAP(t->b, t->c);
-    if (RF_ABOVE(t->b, t->a))
-        RF_SWAP(t->a, t->b);
-#undef RF_SWAP
-#undef RF_ABOVE
-}
-
-// d(u, v)/d(x, y), its singular values and what they ask of the sampler.
-RF_WIDE_BODY void choose_filter(Triangle *t, const RfDrawJob *job, float spacing)
-{
-    // Exemplar pixels a frame pixel.
-    float a = t->dx[0] / spacing, b = t->dy[0] / spacing, c = t->dx[1] / spacing, d = t->dy[1] / spacing;
-    float det = fabsf(a * d - b * c), sum = a * a + b * b + c * c + d * d;
-    float root = sqrtf(fmaxf(sum * sum - 4 * det * det, 0));
-    float largest = sqrtf(0.5f * (sum + root));
-    int level = 0;
-    for (float area = det; area > 2 && level < RF_TEXTURE_LEVELS;
-         area *= 0.25f) // sqrt(det) past sqrt(2): the next level
-        ++level;
-    t->level = rf_min_int(level + job->level_bias, job->texture->level_count - 1);
-    float footprint = largest / (float)(1 << level);
-    t->taps = 1;
-    t->tap_step = (RfVec2){0, 0};
-    if (footprint <= FREE_COMPRESSION)
-        return;
-    // Taps at (k - (n - 1) / 2) s have the variance s^2 (n^2 - 1) / 12.
-    float variance = (footprint * footprint - FREE_COMPRESSION * FREE_COMPRESSION) / 12;
-    t->taps = footprint < 2 ? 2 : footprint < 3 ? 3 : MAX_TAPS;
-    float step = sqrtf(12 * variance / (float)(t->taps * t->taps - 1)) * (float)(1 << level) * spacing;
-    // The long axis in the exemplar: eigenvector of J J^T to the eigenvalue largest^2.
-    float xx = a * a + b * b, xy = a * c + b * d, yy = c * c + d * d;
-    float ex = xx >= yy ? largest * largest - yy : xy, ey = xx >= yy ? xy : largest * largest - xx;
-    float length = sqrtf(ex * ex + ey * ey);
-    t->tap_step = length > 0 ? (RfVec2){step * ex / length, step * ey / length} : (RfVec2){step, 0};
-}
-
-// False if the triangle has no area or lies outside the tile.
-RF_WIDE_BODY bool set_up_triangle(const RfDrawJob *job, const RfDrawGrid *grid, const int corner[3], Triangle *t)
-{
-    float inverse = 1 / job->spacing;
-    RfVec2 p[3];
-    float value[4][3];
-    for (int k = 0; k < 3; ++k)
-    {
-        int i = corner[k] % grid->n, j = corner[k] / grid->n;
-        p[k] = (RfVec2){(grid->x[corner[k]] - job->origin.x) * inverse, (grid->y[corner[k]] - job->origin.y) * inverse};
-        value[0][k] = grid->u0 + (float)i * grid->cell;
-        value[1][k] = grid->v0 + (float)j * grid->cell;
-        value[2][k] = i == 0 || j == 0 || i == grid->n - 1 || j == grid->n - 1 ? 0.0f : 1.0f;
-        value[3][k] = grid->quality[corner[k]];
-    }
-    float x0 = fminf(p[0].x, fminf(p[1].x, p[2].x)), x1 = fmaxf(p[0].x, fmaxf(p[1].x, p[2].x));
-    float y0 = fminf(p[0].y, fminf(p[1].y, p[2].y)), y1 = fmaxf(p[0].y, fmaxf(p[1].y, p[2].y));
-    if (!(x1 > 0 && y1 > 0 && x0 < (float)job->width && y0 < (float)job->height))
-        return false;
-    float ax = p[1].x - p[0].x, ay = p[1].y - p[0].y, bx = p[2].x - p[0].x, by = p[2].y - p[0].y;
-    float det = ax * by - ay * bx;
-    if (!(fabsf(det) > 1e-6f))
-        return false;
-    for (int k = 0; k < 4; ++k)
-    {
-        float da = value[k][1] - value[k][0], db = value[k][2] - value[k][0];
-        t->dx[k] = (da * by - db * ay) / det;
-        t->dy[k] = (db * ax - da * bx) / det;
-        t->base[k] = value[k][0] + (0.5f - p[0].x) * t->dx[k] + (0.5f - p[0].y) * t->dy[k];
-    }
-    t->a = p[0];
-    t->b = p[1];
-    t->c = p[2];
-    sort_corners(t);
-    choose_filter(t, job, job->spacing);
-    return true;
-}
-
-// Clips row y of the triangle; count is 0 where nothing is left.
-RF_WIDE_BODY void set_up_run(const Triangle *t, int y, Run *run)
-{
-    const RfDrawJob *job = run->job;
-    const RfDrawGrid *grid = run->grid;
-    float yc = (float)y + 0.5f;
-    float long_x = edge_x(t->a, t->c, yc);
-    float short_x = yc < t->b.y ? edge_x(t->a, t->b, yc) : edge_x(t->b, t->c, yc);
-    float centre_x = (grid->centre.x - job->origin.x) / job->spacing,
-          centre_y = (grid->centre.y - job->origin.y) / job->spacing;
-    float radius = grid->radius / job->spacing, dy = yc - centre_y, chord2 = radius * radius - dy * dy;
-    run->count = 0;
-    if (!(chord2 > 0))
-        return;
-    float chord = sqrtf(chord2);
-    float left = fmaxf(fminf(long_x, short_x), centre_x - chord),
-          right = fminf(fmaxf(long_x, short_x), centre_x + chord);
-    int first = (int)ceilf(fmaxf(left, 0) - 0.5f), end = (int)ceilf(fminf(right, (float)job->width) - 0.5f);
-    if (end <= first)
-        return;
-    run->first = first;
-    run->y = y;
-    run->count = end - first;
-    run->u = t->base[0] + (float)first * t->dx[0] + (float)y * t->dy[0];
-    run->v = t->base[1] + (float)first * t->dx[1] + (float)y * t->dy[1];
-    run->border = t->base[2] + (float)first * t->dx[2] + (float)y * t->dy[2];
-    run->quality = t->base[3] + (float)first * t->dx[3] + (float)y * t->dy[3];
-    run->centre_x = centre_x;
-    run->dy2 = dy * dy;
-    run->inverse_radius = 1 / radius;
-}
-
-// w = K_p K_g K_d F at the pixels of a run.
-RF_WIDE_BODY void run_weights(const Run *run, float *restrict weight)
-{
-    float sharpness = run->job->sharpness, fade = run->grid->fade;
-    float border_dx = run->triangle->dx[2], quality_dx = run->triangle->dx[3];
-    float x0 = (float)run->first + 0.5f - run->centre_x, dy2 = run->dy2, inverse_radius = run->inverse_radius;
-    float border = run->border, quality = run->quality;
-    int count = run->count;
-    if (sharpness == 1)
-    {
+    float inverse = 1 / job->spacing, cx = (grid->centre.x - job->origin.x) * inverse,
+          cy = (grid->centre.y - job->origin.y) * inverse;
+    float inverse_radius = job->spacing / grid->radius, dy = (float)y + 0.5f - cy, dy2 = dy * dy, fade = grid->fade,
+          sharpness = job->sharpness;
+    float *restrict weight = row->weight;
+    for (int block = row->first / WIDE * WIDE; block < row->end; block += WIDE)
 #pragma omp simd
-        for (int k = 0; k < count; ++k)
+        for (int k = block; k < block + WIDE; ++k)
         {
-            float dx = x0 + (float)k;
-            weight[k] = fmaxf(1 - sqrtf(dx * dx + dy2) * inverse_radius, 0);
+            float dx = (float)k + 0.5f - cx;
+            float kernel = rf_max(1 - sqrtf(dx * dx + dy2) * inverse_radius, 0);
+            weight[k] = kernel_power(kernel, sharpness, power) * plane[k] * fade;
+            plane[k] = 0;
         }
-    }
+}
+
+RF_WIDE_BODY void weigh_row(const RfDrawJob *job, const RfDrawGrid *grid, float *plane, int y, Row *row)
+{
+    if (job->sharpness == 1)
+        weigh_row_with(job, grid, plane, y, row, 1);
+    else if (job->sharpness == 2)
+        weigh_row_with(job, grid, plane, y, row, 2);
     else
-    {
-#pragma omp simd
-        for (int k = 0; k < count; ++k)
-        {
-            float dx = x0 + (float)k, kernel = fmaxf(1 - sqrtf(dx * dx + dy2) * inverse_radius, 1e-6f);
-            weight[k] = fast_exp2(sharpness * fast_log2(kernel));
-        }
-    }
-#pragma omp simd
-    for (int k = 0; k < count; ++k)
-    {
-        float g = fmaxf(border + (float)k * border_dx, 0), q = fmaxf(quality + (float)k * quality_dx, 0);
-        weight[k] *= fminf(g, 1) * fminf(q, 1) * fade;
-    }
+        weigh_row_with(job, grid, plane, y, row, 0);
+    while (row->first < row->end && !(row->weight[row->first] > 0))
+        ++row->first;
+    while (row->first < row->end && !(row->weight[row->end - 1] > 0))
+        --row->end;
 }
 
-// Texel index and fractions at the pixels of a run, shifted by one tap's offset.
-RF_WIDE_BODY void run_texels(const Run *run, const RfTextureLevel *level, bool tiles, RfVec2 shift, int *restrict index,
-                             float *restrict fx, float *restrict fy)
+// ---- sampling
+
+// Exemplar pixels that a frame pixel covers, along both axes of its footprint, and what they ask of the sampler.
+RF_WIDE_BODY Filter choose_filter(const RfDrawJob *job, const RfDrawGrid *grid)
 {
-    float u = (run->u + shift.x - 0.5f) * level->scale_x, v = (run->v + shift.y - 0.5f) * level->scale_y;
-    float du = run->triangle->dx[0] * level->scale_x, dv = run->triangle->dx[1] * level->scale_y;
-    float width = (float)level->width, height = (float)level->height;
-    int stride = level->stride, count = run->count;
-    if (tiles)
-    {
-        float inverse_width = 1 / width, inverse_height = 1 / height;
+    const float *s = grid->stretch;
+    float det = s[0] * s[3] - s[1] * s[2];
+    Filter filter = {rf_min_int(job->level_bias, job->texture->level_count - 1), 1, {0, 0}};
+    if (!(det > 1e-6f))
+        return filter;
+    // d(u, v) / d(x, y)
+    float a = s[3] / det, b = -s[1] / det, c = -s[2] / det, d = s[0] / det, area = 1 / det;
+    float sum = a * a + b * b + c * c + d * d, root = sqrtf(rf_max(sum * sum - 4 * area * area, 0)),
+          largest = sqrtf(0.5f * (sum + root));
+    int level = 0;
+    for (float left = area; left > 2 && level < RF_TEXTURE_LEVELS;
+         left *= 0.25f) // the root of it past the root of 2: the next level
+        ++level;
+    filter.level = rf_min_int(level + job->level_bias, job->texture->level_count - 1);
+    float footprint = largest / (float)(1 << level);
+    if (footprint <= FREE_COMPRESSION)
+        return filter;
+    // Taps at (k - (n - 1) / 2) step have the variance step^2 (n^2 - 1) / 12.
+    float variance = (footprint * footprint - FREE_COMPRESSION * FREE_COMPRESSION) / 12;
+    filter.taps = footprint < 2 ? 2 : footprint < 3 ? 3 : MAX_TAPS;
+    float step = sqrtf(12 * variance / (float)(filter.taps * filter.taps - 1)) * (float)(1 << level) * job->spacing;
+    // The long axis in the exemplar: the eigenvector of J J^T to largest^2.
+    float xx = a * a + b * b, xy = a * c + b * d, yy = c * c + d * d;
+    float ex = xx >= yy ? largest * largest - yy : xy, ey = xx >= yy ? xy : largest * largest - xx,
+          length = sqrtf(ex * ex + ey * ey);
+    filter.step = length > 0 ? (RfVec2){step * ex / length, step * ey / length} : (RfVec2){step, 0};
+    return filter;
+}
+
+// Texel index and fractions over a row, shifted by one tap's offset.
+RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, const float *restrict u, const float *restrict v,
+                              RfVec2 shift, Row *row)
+{
+    float scale_x = level->scale_x, scale_y = level->scale_y, width = (float)level->width,
+          height = (float)level->height;
+    float shift_x = (shift.x - 0.5f) * scale_x, shift_y = (shift.y - 0.5f) * scale_y;
+    float inverse_width = tiles ? 1 / width : 0, inverse_height = tiles ? 1 / height : 0;
+    // Where it tiles, rounding may give width itself: the padding holds the texel there.
+    float last_x = tiles ? width : width - 1, last_y = tiles ? height : height - 1;
+    int stride = level->stride;
+    float *restrict fx = row->fx, *restrict fy = row->fy;
+    int *restrict index = row->index;
+    for (int block = row->first / WIDE * WIDE; block < row->end; block += WIDE)
 #pragma omp simd
-        for (int k = 0; k < count; ++k)
+        for (int k = block; k < block + WIDE; ++k)
         {
-            float s = u + (float)k * du, t = v + (float)k * dv;
+            float s = u[k] * scale_x + shift_x, t = v[k] * scale_y + shift_y;
             s -= width * floorf(s * inverse_width);
             t -= height * floorf(t * inverse_height);
-            // Rounding may give -0.0001 or width itself; the padding holds the texels there.
-            s = fminf(fmaxf(s, 0), width);
-            t = fminf(fmaxf(t, 0), height);
+            s = rf_min(rf_max(s, 0), last_x);
+            t = rf_min(rf_max(t, 0), last_y);
             int i = (int)s, j = (int)t;
             fx[k] = s - (float)i;
             fy[k] = t - (float)j;
             index[k] = j * stride + i;
         }
-    }
-    else
-    {
-#pragma omp simd
-        for (int k = 0; k < count; ++k)
-        {
-            float s = fminf(fmaxf(u + (float)k * du, 0), width - 1), t = fminf(fmaxf(v + (float)k * dv, 0), height - 1);
-            int i = (int)s, j = (int)t;
-            fx[k] = s - (float)i;
-            fy[k] = t - (float)j;
-            index[k] = j * stride + i;
-        }
-    }
 }
 
-// Sums one tap of one quad. `turn` is a constant at every call, so the plain form pays nothing for it.
-RF_WIDE_BODY void sum_samples(const Run *run, const float *restrict texels, int stride, const int *restrict index,
-                              const float *restrict fx, const float *restrict fy, const float *restrict weight,
-                              float *restrict sums, int turn)
+// Sums one tap of one quad over a row. `turn` is a constant at every call, so the plain form pays nothing for it.
+RF_WIDE_BODY void sum_samples(const RfDrawGrid *grid, const float *restrict texels, int stride, const Row *row,
+                              float share, float *restrict sums, int turn)
 {
-    float c = run->grid->turn_cos, s = turn == 1 ? -run->grid->turn_sin : run->grid->turn_sin;
+    float c = grid->turn_cos, s = turn == 1 ? -grid->turn_sin : grid->turn_sin;
     const Vec8 along = {c, c, 1, 1, c, c, 1, 1}, across = {-s, s, 0, 0, -s, s, 0, 0};
-    for (int k = 0; k < run->count; ++k)
+    for (int k = row->first; k < row->end; ++k)
     {
-        const float *texel = texels + (size_t)index[k] * 4;
+        const float *texel = texels + (size_t)row->index[k] * 4;
         Vec8 upper = *(const Vec8 *)texel, lower = *(const Vec8 *)(texel + (size_t)stride * 4);
-        Vec8 r = upper + fy[k] * (lower - upper);
+        Vec8 r = upper + row->fy[k] * (lower - upper);
         if (turn)
         {
             Vec8 swapped = {r[1], r[0], r[2], r[3], r[5], r[4], r[6], r[7]};
             r = along * r + across * swapped;
         }
-        float w1 = weight[k] * fx[k], w0 = weight[k] - w1;
+        float weight = row->weight[k] * share, w1 = weight * row->fx[k], w0 = weight - w1;
         r *= (Vec8){w0, w0, w0, w0, w1, w1, w1, w1};
         Vec4 *sum = (Vec4 *)(sums + (size_t)k * 4);
         Vec4 low = {r[0], r[1], r[2], r[3]}, high = {r[4], r[5], r[6], r[7]};
@@ -322,38 +396,34 @@ RF_WIDE_BODY void sum_samples(const Run *run, const float *restrict texels, int 
     }
 }
 
-RF_WIDE_BODY void sum_run(const Run *run, const float *restrict weight, RfTileSums *sums)
+RF_WIDE_BODY void sum_row(const RfDrawJob *job, const RfDrawGrid *grid, const Filter *filter, int y, Row *row,
+                          RfTileSums *sums)
 {
-    const RfDrawJob *job = run->job;
-    const Triangle *t = run->triangle;
-    const RfTextureLevel *level = &job->texture->levels[t->level];
-    int index[RF_TILE_SPAN];
-    float fx[RF_TILE_SPAN], fy[RF_TILE_SPAN], part[RF_TILE_SPAN];
-    float share = 1 / (float)t->taps;
-    for (int k = 0; k < run->count; ++k)
-        part[k] = weight[k] * share;
-    size_t place = (size_t)run->y * RF_TILE_SPAN + (size_t)run->first;
-    for (int tap = 0; tap < t->taps; ++tap)
+    const RfTextureLevel *level = &job->texture->levels[filter->level];
+    const float *u = sums->planes->u + y * RF_TILE_PITCH, *v = sums->planes->v + y * RF_TILE_PITCH;
+    size_t place = (size_t)y * RF_TILE_SPAN;
+    float share = 1 / (float)filter->taps;
+    for (int tap = 0; tap < filter->taps; ++tap)
     {
-        float along = (float)tap - 0.5f * (float)(t->taps - 1);
-        run_texels(run, level, job->texture->tiles, (RfVec2){along * t->tap_step.x, along * t->tap_step.y}, index, fx,
-                   fy);
+        float along = (float)tap - 0.5f * (float)(filter->taps - 1);
+        find_texels(level, job->texture->tiles, u, v, (RfVec2){along * filter->step.x, along * filter->step.y}, row);
         for (int q = 0; q < job->texture->quads; ++q)
         {
             const float *texels = level->texels + (size_t)q * rf_texture_plane(level);
-            float *colour = sums->colour + ((size_t)q * RF_TILE_SPAN * RF_TILE_SPAN + place) * 4;
+            float *colour = sums->colour + ((size_t)q * TILE_PIXELS + place) * 4;
             if (job->turned[q] == 0)
-                sum_samples(run, texels, level->stride, index, fx, fy, part, colour, 0);
+                sum_samples(grid, texels, level->stride, row, share, colour, 0);
             else if (job->turned[q] == 1)
-                sum_samples(run, texels, level->stride, index, fx, fy, part, colour, 1);
+                sum_samples(grid, texels, level->stride, row, share, colour, 1);
             else
-                sum_samples(run, texels, level->stride, index, fx, fy, part, colour, 2);
+                sum_samples(grid, texels, level->stride, row, share, colour, 2);
         }
     }
     float *restrict w1 = sums->weight + place, *restrict w2 = sums->weight2 + place,
                     *restrict levels = sums->level + place;
-    float level_number = (float)t->level;
-    for (int k = 0; k < run->count; ++k)
+    const float *restrict weight = row->weight;
+    float level_number = (float)filter->level;
+    for (int k = row->first; k < row->end; ++k)
     {
         w1[k] += weight[k];
         w2[k] += weight[k] * weight[k];
@@ -361,99 +431,84 @@ RF_WIDE_BODY void sum_run(const Run *run, const float *restrict weight, RfTileSu
     }
 }
 
-RF_WIDE_BODY void keep_lattice(const Run *run, const float *weight, float *lattice)
+RF_WIDE_BODY void keep_lattice(const Row *row, int y, float *lattice)
 {
-    if (run->y % RF_LATTICE_STEP != 0)
-        return;
-    float *row = lattice + run->y / RF_LATTICE_STEP * RF_LATTICE_SPAN;
-    for (int x = (run->first + RF_LATTICE_STEP - 1) / RF_LATTICE_STEP * RF_LATTICE_STEP; x < run->first + run->count;
+    float *to = lattice + y / RF_LATTICE_STEP * RF_LATTICE_SPAN;
+    for (int x = (row->first + RF_LATTICE_STEP - 1) / RF_LATTICE_STEP * RF_LATTICE_STEP; x < row->end;
          x += RF_LATTICE_STEP)
-        row[x / RF_LATTICE_STEP] = weight[x - run->first];
-}
-
-RF_WIDE_BODY void insert_layers(const Run *run, const float *weight, RfTileLayer *layers)
-{
-    for (int k = 0; k < run->count; ++k)
-    {
-        RfTileLayer *layer = layers + (size_t)run->y * RF_TILE_SPAN + (size_t)(run->first + k);
-        layer->total += weight[k];
-        int slot = 4;
-        while (slot > 0 && weight[k] > layer->weight[slot - 1])
-            --slot;
-        if (slot == 4)
-            continue;
-        for (int i = 3; i > slot; --i)
-        {
-            layer->u[i] = layer->u[i - 1];
-            layer->v[i] = layer->v[i - 1];
-            layer->weight[i] = layer->weight[i - 1];
-            layer->id[i] = layer->id[i - 1];
-        }
-        layer->u[slot] = run->u + (float)k * run->triangle->dx[0];
-        layer->v[slot] = run->v + (float)k * run->triangle->dx[1];
-        layer->weight[slot] = weight[k];
-        layer->id[slot] = (int32_t)run->grid->id;
-    }
-}
-
-// Either sums or layers is NULL.
-RF_WIDE_BODY void draw_triangle(const RfDrawJob *job, const RfDrawGrid *grid, const int corner[3], RfTileSums *sums,
-                                float *lattice, int64_t *pixels_drawn, RfTileLayer *layers)
-{
-    Triangle t;
-    if (!set_up_triangle(job, grid, corner, &t))
-        return;
-    Run run = {.job = job, .grid = grid, .triangle = &t};
-    float weight[RF_TILE_SPAN];
-    int first = (int)ceilf(fmaxf(t.a.y, 0) - 0.5f), end = (int)ceilf(fminf(t.c.y, (float)job->height) - 0.5f);
-    for (int y = first; y < end; ++y)
-    {
-        set_up_run(&t, y, &run);
-        if (run.count == 0)
-            continue;
-        run_weights(&run, weight);
-        if (layers)
-        {
-            insert_layers(&run, weight, layers);
-            continue;
-        }
-        sum_run(&run, weight, sums);
-        *pixels_drawn += run.count * t.taps;
-        if (lattice)
-            keep_lattice(&run, weight, lattice);
-    }
-}
-
-RF_WIDE_BODY void draw_grid(const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice,
-                            int64_t *pixels_drawn, RfTileLayer *layers)
-{
-    assert(job->width <= RF_TILE_SPAN && job->height <= RF_TILE_SPAN);
-    int n = grid->n;
-    for (int j = 0; j + 1 < n; ++j)
-        for (int i = 0; i + 1 < n; ++i)
-        {
-            int a = j * n + i;
-            const int upper[3] = {a, a + 1, a + n}, lower[3] = {a + n + 1, a + n, a + 1};
-            draw_triangle(job, grid, upper, sums, lattice, pixels_drawn, layers);
-            draw_triangle(job, grid, lower, sums, lattice, pixels_drawn, layers);
-        }
+        to[x / RF_LATTICE_STEP] = row->weight[x];
 }
 
 RF_WIDE_BODY void rf_tile_draw_body(const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice,
-                                    int64_t *pixels_drawn)
+                                    int64_t *samples)
 {
+    Extent extent;
+    Filter filter = choose_filter(job, grid);
     if (lattice)
         memset(lattice, 0, RF_LATTICE_POINTS * sizeof *lattice);
-    draw_grid(job, grid, sums, lattice, pixels_drawn, NULL);
+    rasterise(job, grid, sums->planes, &extent);
+    for (int y = 0; y < job->height; ++y)
+    {
+        Row row;
+        row.first = extent.first[y];
+        row.end = extent.end[y];
+        if (row.first >= row.end)
+            continue;
+        weigh_row(job, grid, sums->planes->weight + y * RF_TILE_PITCH, y, &row);
+        if (row.first >= row.end)
+            continue;
+        sum_row(job, grid, &filter, y, &row, sums);
+        *samples += (int64_t)(row.end - row.first) * filter.taps;
+        if (lattice && y % RF_LATTICE_STEP == 0)
+            keep_lattice(&row, y, lattice);
+    }
 }
 
 RF_WIDE(rf_tile_draw,
-        (const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice, int64_t *pixels_drawn),
-        (job, grid, sums, lattice, pixels_drawn))
+        (const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice, int64_t *samples),
+        (job, grid, sums, lattice, samples))
 
-RF_WIDE_BODY void rf_tile_layers_body(const RfDrawJob *job, const RfDrawGrid *grid, RfTileLayer *layers)
+// ---- layers
+
+RF_WIDE_BODY void insert_layer(RfTileLayer *layer, float u, float v, float weight, uint32_t id)
 {
-    draw_grid(job, grid, NULL, NULL, NULL, layers);
+    layer->total += weight;
+    int slot = 4;
+    while (slot > 0 && weight > layer->weight[slot - 1])
+        --slot;
+    if (slot == 4)
+        return;
+    for (int i = 3; i > slot; --i)
+    {
+        layer->u[i] = layer->u[i - 1];
+        layer->v[i] = layer->v[i - 1];
+        layer->weight[i] = layer->weight[i - 1];
+        layer->id[i] = layer->id[i - 1];
+    }
+    layer->u[slot] = u;
+    layer->v[slot] = v;
+    layer->weight[slot] = weight;
+    layer->id[slot] = (int32_t)id;
 }
 
-RF_WIDE(rf_tile_layers, (const RfDrawJob *job, const RfDrawGrid *grid, RfTileLayer *layers), (job, grid, layers))
+RF_WIDE_BODY void rf_tile_layers_body(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes,
+                                      RfTileLayer *layers)
+{
+    Extent extent;
+    rasterise(job, grid, planes, &extent);
+    for (int y = 0; y < job->height; ++y)
+    {
+        Row row;
+        row.first = extent.first[y];
+        row.end = extent.end[y];
+        if (row.first >= row.end)
+            continue;
+        weigh_row(job, grid, planes->weight + y * RF_TILE_PITCH, y, &row);
+        for (int x = row.first; x < row.end; ++x)
+            insert_layer(&layers[y * RF_TILE_SPAN + x], planes->u[y * RF_TILE_PITCH + x],
+                         planes->v[y * RF_TILE_PITCH + x], row.weight[x], grid->id);
+    }
+}
+
+RF_WIDE(rf_tile_layers, (const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, RfTileLayer *layers),
+        (job, grid, planes, layers))

@@ -3,6 +3,7 @@
 // the sums are the caller's.
 #pragma once
 
+#include "core/memory.h"
 #include "kernels/texture.h"
 
 enum
@@ -11,6 +12,8 @@ enum
     /// border.
     RF_TILE = 64,
     RF_TILE_SPAN = RF_TILE + 1,
+    /// Row stride of a tile's planes: whole vectors.
+    RF_TILE_PITCH = (RF_TILE_SPAN + 15) / 16 * 16,
     /// Weights of single grids are kept at every RF_LATTICE_STEP-th pixel, for the correlation of grids that overlap.
     RF_LATTICE_STEP = 8,
     RF_LATTICE_SPAN = RF_TILE / RF_LATTICE_STEP + 1,
@@ -26,6 +29,8 @@ typedef struct RfDrawGrid
     const float *quality;
     int n;
     float u0, v0, cell;
+    /// Frame pixels an exemplar pixel, averaged over the grid: d(x, y) / d(u, v), row by row. Chooses the filter.
+    float stretch[4];
     /// Of the kernel K_p.
     RfVec2 centre;
     float radius;
@@ -53,6 +58,13 @@ typedef struct RfDrawJob
     int level_bias;
 } RfDrawJob;
 
+/// One grid's coordinates and K_g K_d over a tile, between rasterising and sampling; `weight` is 0 everywhere between
+/// two grids.
+typedef struct RfTilePlanes
+{
+    float u[RF_TILE_SPAN * RF_TILE_PITCH], v[RF_TILE_SPAN * RF_TILE_PITCH], weight[RF_TILE_SPAN * RF_TILE_PITCH];
+} RfTilePlanes;
+
 /// Sums over the grids drawn so far. colour: [quads][RF_TILE_SPAN * RF_TILE_SPAN][4], of w (T - m); the others:
 /// [RF_TILE_SPAN * RF_TILE_SPAN], row stride RF_TILE_SPAN.
 typedef struct RfTileSums
@@ -61,14 +73,16 @@ typedef struct RfTileSums
     float *weight, *weight2;
     /// Of w times the texture level.
     float *level;
+    RfTilePlanes *planes;
 } RfTileSums;
 
+/// Memory for the sums of one tile, cleared.
+RfResult rf_tile_create(int quads, RfArena *arena, RfTileSums *out);
 void rf_tile_clear(RfTileSums *sums, int quads);
 
 /// Adds one grid. lattice (NULL: not wanted): [RF_LATTICE_POINTS], cleared here, w of this grid at the lattice. Returns
 /// nothing; pixels_drawn grows by the samples taken.
-void rf_tile_draw(const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice,
-                  int64_t *pixels_drawn);
+void rf_tile_draw(const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice, int64_t *samples);
 
 /// The four strongest grids a pixel, strongest first: [RF_TILE_SPAN * RF_TILE_SPAN].
 typedef struct RfTileLayer
@@ -78,4 +92,4 @@ typedef struct RfTileLayer
     float total;
 } RfTileLayer;
 
-void rf_tile_layers(const RfDrawJob *job, const RfDrawGrid *grid, RfTileLayer *layers);
+void rf_tile_layers(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, RfTileLayer *layers);

@@ -6,6 +6,7 @@
 // equation 3; equal ones (rho = 1) give the plain mean.
 
 #include "kernels/resolving.h"
+#include "core/maths.h"
 #include "core/simd.h"
 
 #include <math.h>
@@ -17,7 +18,7 @@ RF_WIDE_BODY void rf_resolve_scales_body(const float *restrict weight, const flo
 #pragma omp simd
     for (int k = 0; k < count; ++k)
     {
-        float w = weight[k], w2 = weight2[k], norm2 = w2 + rho[k] * fmaxf(w * w - w2, 0);
+        float w = weight[k], w2 = weight2[k], norm2 = w2 + rho[k] * rf_max(w * w - w2, 0);
         inverse_sum[k] = w > 0 ? 1 / w : 0;
         inverse_norm[k] = norm2 > 0 ? 1 / sqrtf(norm2) : inverse_sum[k];
     }

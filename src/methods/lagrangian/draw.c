@@ -26,6 +26,9 @@ enum
     TILE_PIXELS = RF_TILE_SPAN * RF_TILE_SPAN
 };
 
+// Pictures that contradict each other are not pulled further apart than this.
+#define LEAST_RHO -0.3f
+
 RfDrawGrid draw_grid_of(const RfLagrangian *l, int index, double time)
 {
     const Grid *grid = &l->grids[index];
@@ -43,6 +46,7 @@ RfDrawGrid draw_grid_of(const RfLagrangian *l, int index, double time)
                        .fade = grid_fade(grid, time),
                        .turn_cos = grid->turn_cos,
                        .turn_sin = grid->turn_sin,
+                       .stretch = {grid->stretch[0], grid->stretch[1], grid->stretch[2], grid->stretch[3]},
                        .id = grid->id};
     draw.x0 = draw.y0 = INFINITY;
     draw.x1 = draw.y1 = -INFINITY;
@@ -132,15 +136,11 @@ static RfResult scratch_create(RfLagrangian *l, int worker, Scratch *out)
 {
     RfArena *arena = &l->workers[worker];
     size_t lanes = (size_t)l->material.lane_count;
-    out->sums.colour = rf_arena_push(arena, lanes * TILE_PIXELS, sizeof(float));
-    out->sums.weight = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
-    out->sums.weight2 = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
-    out->sums.level = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
+    RF_TRY(rf_tile_create(l->material.texture.quads, arena, &out->sums));
     out->lattice = rf_arena_push(arena, (size_t)MAX_CORRELATED * RF_LATTICE_POINTS, sizeof(float));
     out->values = rf_arena_push(arena, lanes * RF_TILE, sizeof(float));
     out->place = rf_arena_push(arena, (size_t)l->count, sizeof(int));
-    if (!out->sums.colour || !out->sums.weight || !out->sums.weight2 || !out->sums.level || !out->lattice ||
-        !out->values || !out->place)
+    if (!out->lattice || !out->values || !out->place)
         return RF_OUT_OF_MEMORY;
     // The place of a grid in the tile at hand, or -1.
     for (int g = 0; g < l->count; ++g)
@@ -207,7 +207,7 @@ static void mix_correlations(const FrameJob *job, Scratch *scratch, const int *o
     for (int k = 0; k < RF_LATTICE_POINTS; ++k)
     {
         float pairs = sum[k] * sum[k] - squares[k];
-        rho[k] = pairs > 1e-4f * squares[k] ? rf_clamp(cross[k] / pairs, 0, 1) : 0;
+        rho[k] = pairs > 1e-4f * squares[k] ? rf_clamp(cross[k] / pairs, LEAST_RHO, 1) : 0;
     }
 }
 
@@ -371,6 +371,7 @@ typedef struct LayersJob
     const RfLagrangian *l;
     RfImageView layers;
     RfTileLayer *tiles[RF_MAX_THREADS];
+    RfTilePlanes *planes;
     int columns;
 } LayersJob;
 
@@ -410,7 +411,7 @@ static void layer_tile(void *context, int tile, int worker)
         RfDrawGrid grid = draw_grid_of(l, g, l->time);
         if (grid.fade > 0 && grid.x1 > (float)x0 && grid.y1 > (float)y0 && grid.x0 < (float)(x0 + draw.width) &&
             grid.y0 < (float)(y0 + draw.height))
-            rf_tile_layers(&draw, &grid, layers);
+            rf_tile_layers(&draw, &grid, &job->planes[worker], layers);
     }
     write_layers(job, layers, x0, y0, draw.width, draw.height);
 }
@@ -425,11 +426,17 @@ RfResult rf_lagrangian_layers(const RfLagrangian *l, const RfImageView *layers)
     LayersJob job = {.l = l, .layers = *layers, .columns = (l->width + RF_TILE - 1) / RF_TILE};
     int workers = rf_threads();
     RfTileLayer *memory = rf_allocate((size_t)workers * TILE_PIXELS, sizeof *memory);
-    if (!memory)
+    job.planes = rf_allocate_zero((size_t)workers, sizeof *job.planes);
+    if (!memory || !job.planes)
+    {
+        rf_release(memory);
+        rf_release(job.planes);
         return RF_OUT_OF_MEMORY;
+    }
     for (int i = 0; i < workers; ++i)
         job.tiles[i] = memory + (size_t)i * TILE_PIXELS;
     rf_parallel_for(job.columns * ((l->height + RF_TILE - 1) / RF_TILE), layer_tile, &job);
     rf_release(memory);
+    rf_release(job.planes);
     return RF_OK;
 }

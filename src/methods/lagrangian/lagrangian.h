@@ -59,6 +59,8 @@ typedef struct Grid
     /// Exemplar coordinates of vertex (0, 0).
     float u0, v0;
     float turn_cos, turn_sin;
+    /// Mean deformation, d(x, y) / d(u, v).
+    float stretch[4];
     float least_quality, greatest_quality;
     /// Rate of strain at the centre, 1 / frame.
     float strain;

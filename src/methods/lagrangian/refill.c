@@ -71,15 +71,7 @@ static RfResult patch_create(const RfLagrangian *l, RfVec2 centre, int halvings,
                            .height = side,
                            .level_bias = halvings + 1};
     memcpy(out->job.turned, m->turned, sizeof m->turned);
-    size_t pixels = (size_t)RF_TILE_SPAN * RF_TILE_SPAN;
-    out->sums.colour = rf_arena_push(arena, pixels * 4 * (size_t)m->texture.quads, sizeof(float));
-    out->sums.weight = rf_arena_push(arena, pixels, sizeof(float));
-    out->sums.weight2 = rf_arena_push(arena, pixels, sizeof(float));
-    out->sums.level = rf_arena_push(arena, pixels, sizeof(float));
-    if (!out->sums.colour || !out->sums.weight || !out->sums.weight2 || !out->sums.level)
-        return RF_OUT_OF_MEMORY;
-    rf_tile_clear(&out->sums, m->texture.quads);
-    return RF_OK;
+    return rf_tile_create(m->texture.quads, arena, &out->sums);
 }
 
 static void find_overlaps(Birth *birth)
@@ -300,9 +292,9 @@ static void remember(Grid *grid, Resemblance resemblance)
     }
     int weakest = 0;
     for (int i = 1; i < MAX_RESEMBLANCES; ++i)
-        if (grid->resemblances[i].correlation < grid->resemblances[weakest].correlation)
+        if (fabsf(grid->resemblances[i].correlation) < fabsf(grid->resemblances[weakest].correlation))
             weakest = i;
-    if (resemblance.correlation > grid->resemblances[weakest].correlation)
+    if (fabsf(resemblance.correlation) > fabsf(grid->resemblances[weakest].correlation))
         grid->resemblances[weakest] = resemblance;
 }
 
@@ -329,8 +321,8 @@ static RfResult measure_resemblances(Birth *birth, int halvings, RfArena *arena)
         rf_tile_clear(&other.sums, l->material.texture.quads);
         rf_tile_draw(&other.job, &old, &other.sums, NULL, &pixels);
         float rho = correlation(&l->material, &mine, &other);
-        if (rho > LEAST_RESEMBLANCE)
-            remember(grid, (Resemblance){old.id, fminf(rho, 1)});
+        if (fabsf(rho) > LEAST_RESEMBLANCE)
+            remember(grid, (Resemblance){old.id, rf_clamp(rho, -1, 1)});
     }
     return RF_OK;
 }

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// How fast is a step? CSV on stdout: case,size,threads,stage,ms (median of n frames),n,copy floor ms,sampling floor ms.
+//
+//   bench_speed [frames=60]
+//
+// The floors are measured in the same run, between the frames: copying a frame, and one bilinear RGBA sample a drawn
+// sample, no weights, no edges. The machine may be shared, so compare figures of one run only.
+
+#include "riffle/riffle.h"
+#include "support/scenes.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum
+{
+    SIZE = 1024,
+    TEXTURE = 512,
+    MAX_FRAMES = 2000
+};
+
+typedef float Vec4 __attribute__((vector_size(16)));
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static double median(double *values, int n)
+{
+    qsort(values, (size_t)n, sizeof *values, compare);
+    return values[n / 2];
+}
+
+static double copy_floor(float *to, const float *from, size_t floats, int threads)
+{
+    double start = now();
+#pragma omp parallel for num_threads(threads)
+    for (int part = 0; part < threads; ++part)
+        memcpy(to + floats * (size_t)part / (size_t)threads, from + floats * (size_t)part / (size_t)threads,
+               floats / (size_t)threads * sizeof *to);
+    return now() - start;
+}
+
+// Rows of a frame, each sampled along a slightly turned line of the texture, `layers` times over.
+static double sampling_floor(const Vec4 *texture, Vec4 *frame, float layers, int threads)
+{
+    double start = now();
+    int rows = (int)((float)SIZE * layers);
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
+    for (int row = 0; row < rows; ++row)
+    {
+        int y = row % SIZE;
+        for (int x = 0; x < SIZE; ++x)
+        {
+            float u = (float)x * 1.9f + (float)y * 0.1f, v = (float)y * 1.9f - (float)x * 0.1f + 200;
+            int i = (int)u, j = (int)v;
+            float fx = u - (float)i, fy = v - (float)j;
+            i &= TEXTURE - 1;
+            j &= TEXTURE - 1;
+            const Vec4 *t = texture + (size_t)j * (TEXTURE + 1) + (size_t)i;
+            Vec4 upper = t[0] + fx * (t[1] - t[0]), lower = t[TEXTURE + 1] + fx * (t[TEXTURE + 2] - t[TEXTURE + 1]);
+            frame[(size_t)y * SIZE + (size_t)x] += upper + fy * (lower - upper);
+        }
+    }
+    return now() - start;
+}
+
+static void require(RfResult result)
+{
+    if (result == RF_OK)
+        return;
+    fprintf(stderr, "bench_speed: %s\n", rf_last_error()->message);
+    exit(1);
+}
+
+static void run(const RfExemplar *exemplar, const char *name, RfLagrangianOptions options, int threads, int frames)
+{
+    static double stage[4][MAX_FRAMES], copies[MAX_FRAMES], samplings[MAX_FRAMES];
+    static const char *const names[4] = {"advect", "distribute", "draw", "all"};
+    RfLagrangian *lagrangian;
+    RfImage *image;
+    require(rf_lagrangian_create(exemplar, &options, &lagrangian));
+    require(rf_image_create(SIZE, SIZE, 3, &image));
+    RfImageView frame = rf_image_view(image);
+    float *copy = malloc((size_t)SIZE * SIZE * 3 * sizeof *copy);
+    Vec4 *texture = aligned_alloc(64, (TEXTURE + 2) * (TEXTURE + 1) * sizeof *texture + 64),
+         *sums = aligned_alloc(64, (size_t)SIZE * SIZE * sizeof *sums);
+    memset(texture, 0, (TEXTURE + 2) * (TEXTURE + 1) * sizeof *texture);
+    memset(sums, 0, (size_t)SIZE * SIZE * sizeof *sums);
+    memset(copy, 0, (size_t)SIZE * SIZE * 3 * sizeof *copy);
+    SceneMoments scene = scene_moments(scene_two_vortices, 256, 256);
+    rf_set_threads(threads);
+    float layers = 0;
+    int warm_up = 30, live = 0;
+    for (int f = 0; f < frames + warm_up; ++f)
+    {
+        RfFlowView view = scene_step(&scene, f);
+        require(rf_lagrangian_step(lagrangian, &view, &frame));
+        if (f < warm_up)
+            continue;
+        RfLagrangianStats s = rf_lagrangian_stats(lagrangian);
+        int k = f - warm_up;
+        stage[0][k] = 1e3 * s.advect_seconds;
+        stage[1][k] = 1e3 * s.distribute_seconds;
+        stage[2][k] = 1e3 * s.draw_seconds;
+        stage[3][k] = stage[0][k] + stage[1][k] + stage[2][k];
+        layers = s.layers;
+        live = s.live + s.fading;
+        copies[k] = copy_floor(copy, frame.pixels, (size_t)SIZE * SIZE * 3, threads);
+        samplings[k] = sampling_floor(texture, sums, layers, threads);
+    }
+    double copy_ms = median(copies, frames), sampling_ms = median(samplings, frames);
+    for (int s = 0; s < 4; ++s)
+        printf("%s (%d grids; %.1f layers),%dx%d,%d,%s,%.2f,%d,%.2f,%.2f\n", name, live, (double)layers, SIZE, SIZE,
+               threads, names[s], median(stage[s], frames), frames, copy_ms, sampling_ms);
+    fflush(stdout);
+    scene_moments_free(&scene);
+    rf_lagrangian_destroy(lagrangian);
+    rf_image_destroy(image);
+    free(copy);
+    free(texture);
+    free(sums);
+}
+
+int main(int argc, char **argv)
+{
+    int frames = argc > 1 ? atoi(argv[1] + (strncmp(argv[1], "frames=", 7) == 0 ? 7 : 0)) : 60;
+    frames = frames < 1 ? 1 : frames > MAX_FRAMES ? MAX_FRAMES : frames;
+    RfImage *image;
+    require(rf_image_read("builtin:bubbles?size=256", &image));
+    RfMapView map = {"colour", RF_MAP_COLOUR, rf_image_view(image), 1};
+    RfExemplar *exemplar;
+    require(rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar));
+    printf("case,size,threads,stage,ms,frames,copy floor ms,sampling floor ms\n");
+    RfLagrangianOptions options = rf_lagrangian_defaults(), paper = rf_lagrangian_paper(), histogram = options;
+    options.particle_radius = histogram.particle_radius = paper.particle_radius =
+        72; // about 150 particles in steady state
+    histogram.blend = RF_BLEND_HISTOGRAM;
+    for (int threads = 1; threads <= 2; ++threads)
+    {
+        run(exemplar, "default", options, threads, frames);
+        run(exemplar, "histogram blend", histogram, threads, frames);
+        run(exemplar, "paper", paper, threads, frames);
+    }
+    rf_exemplar_destroy(exemplar);
+    rf_image_destroy(image);
+    return 0;
+}
