@@ -26,5 +26,5 @@ typedef enum InputKind
     INPUT_FLOW
 } InputKind;
 
-/// What a path holds, by its name: `as_flow` decides for EXR, which may be either, and for a PNG with a JSON beside it.
+/// What a path holds, by its name. An EXR may be either, and so may a PNG with a JSON beside it: the caller says which.
 int input_kind(const char *path, bool exr_is_flow, bool png_is_flow, InputKind *kind);

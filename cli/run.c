@@ -50,6 +50,8 @@ typedef struct Run
     int saved;
     FrameSlot slots[2];
     Job jobs[2];
+    /// 1 where nothing is written: a second frame in memory would be of no use.
+    int slot_count;
     Worker worker;
     /// Frames written by this run, and whether it continued another.
     int written;
@@ -82,9 +84,9 @@ static int compute(void *context)
 
 static void post(Run *run, int index)
 {
-    Job *job = &run->jobs[index % 2];
+    Job *job = &run->jobs[index % run->slot_count];
     *job = (Job){.source = run->source,
-                 .slot = &run->slots[index % 2],
+                 .slot = &run->slots[index % run->slot_count],
                  .index = index,
                  .frame = plan_number(run->plan, index),
                  .drawn = plan_drawn(run->plan, index),
@@ -127,7 +129,7 @@ static void weigh_saving(Run *run)
 
 static int finish_frame(Run *run, int index)
 {
-    Job *job = &run->jobs[index % 2];
+    Job *job = &run->jobs[index % run->slot_count];
     FrameSlot *slot = job->slot;
     double start = now_seconds();
     int code = CODE_DONE;
@@ -205,7 +207,7 @@ static int stop_run(Run *run, int index, bool posted)
 static int stream(Run *run, int first)
 {
     int count = run->plan->count;
-    bool overlap = !outputs_idle(run->outputs);
+    bool overlap = run->slot_count > 1;
     if (first < count)
         post(run, first);
     for (int index = first; index < count; ++index)
@@ -329,6 +331,7 @@ int run_frames(const Settings *settings, const FramePlan *plan, const FrameSourc
     run->source = source;
     run->outputs = outputs;
     run->state_every = 1;
+    run->slot_count = outputs_idle(outputs) ? 1 : 2;
     int first = 0;
     int code = prepare(run, &first);
     code = code ? code : close_run(run, run_prepared(run, first));

@@ -104,6 +104,9 @@ static int produce(void *context, int index, int frame, bool drawn, FrameSlot *s
     RfResult result = drawn ? draw(texture, &flow, slot)
                             : texture->method->advance(texture->state, &flow, texture->width, texture->height);
     slot->seconds = now_seconds() - start;
+    if (result == RF_OUT_OF_MEMORY)
+        return fail(CODE_FAILED, NULL, NULL, "out of memory with frames of %d x %d pixels; give a smaller --size",
+                    texture->width, texture->height);
     return result == RF_OK ? CODE_DONE : fail_result(result, NULL);
 }
 
