@@ -32,7 +32,7 @@ awk -v status="$status" '
         cmocka = failed_here = 0
     }
     function fail(what) { ++failed; ++failed_here; failures = failures "failed: " what "\n" }
-    function skip(what, why) { ++skipped; skips = skips "skipped: " what ": " (why ? why : "no reason given") "\n" }
+    function skip(what, why) { sub(/^skipped: /, "", why); ++skipped; skips = skips "skipped: " what ": " (why ? why : "no reason given") "\n" }
 
     NR == FNR && match($0, /Test +#[0-9]+: /) {
         split(substr($0, RSTART + RLENGTH), word, " ")
