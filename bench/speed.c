@@ -147,7 +147,7 @@ int main(int argc, char **argv)
     printf("case,size,threads,stage,ms,frames,copy floor ms,sampling floor ms\n");
     RfLagrangianOptions options = rf_lagrangian_defaults(), paper = rf_lagrangian_paper(), histogram = options;
     options.particle_radius = histogram.particle_radius = paper.particle_radius =
-        72; // about 150 particles in steady state
+        80; // about 150 particles in steady state
     histogram.blend = RF_BLEND_HISTOGRAM;
     for (int threads = 1; threads <= 2; ++threads)
     {

@@ -5,17 +5,10 @@
 
 #include "kernels/best_match.h"
 #include "core/maths.h"
-#include "core/parallel.h"
 #include "core/random.h"
 #include "core/simd.h"
 
 #include <assert.h>
-
-enum
-{
-    MAX_KEEP = 8,
-    MAX_CHUNKS = 256
-};
 
 RF_WIDE_BODY void match_row_body(const float *restrict texels, const float *restrict target,
                                  const float *restrict weight, int count, float *restrict sum)
@@ -66,15 +59,6 @@ void rf_match_places(const RfMatchWindow *window, int places[2])
         window->texture->tiles ? level->height : rf_max_int(level->height - window->height - 2 * window->margin + 1, 0);
 }
 
-typedef struct Search
-{
-    const RfMatchWindow *window;
-    int places[2], tries, keep, chunk_size;
-    bool all;
-    uint64_t seed, frame, item;
-    RfMatch *best; // [chunks][keep]
-} Search;
-
 static void insert_match(RfMatch *best, int keep, RfMatch match)
 {
     if (!(match.cost < best[keep - 1].cost))
@@ -85,47 +69,25 @@ static void insert_match(RfMatch *best, int keep, RfMatch match)
     best[slot] = match;
 }
 
-static void search_chunk(void *context, int chunk, int worker)
-{
-    (void)worker;
-    const Search *search = context;
-    RfMatch *best = search->best + chunk * search->keep;
-    for (int k = 0; k < search->keep; ++k)
-        best[k] = (RfMatch){0, 0, INFINITY};
-    int end = rf_min_int((chunk + 1) * search->chunk_size, search->tries);
-    for (int i = chunk * search->chunk_size; i < end; ++i)
-    {
-        uint32_t place = (uint32_t)i;
-        if (!search->all)
-            place = rf_random_below((uint32_t)(search->places[0] * search->places[1]), search->seed, search->frame,
-                                    search->item, (uint64_t)i + 16);
-        int margin = search->window->texture->tiles ? 0 : search->window->margin;
-        RfMatch match = {(int)place % search->places[0] + margin, (int)place / search->places[0] + margin, 0};
-        rf_match_cost(search->window, match.x, match.y, &match.cost);
-        insert_match(best, search->keep, match);
-    }
-}
-
 int rf_match_search(const RfMatchWindow *window, int tries, int keep, uint64_t seed, uint64_t frame, uint64_t item,
                     RfMatch *best)
 {
-    assert(keep >= 1 && keep <= MAX_KEEP);
-    Search search = {.window = window, .keep = keep, .seed = seed, .frame = frame, .item = item};
-    rf_match_places(window, search.places);
-    int64_t all = (int64_t)search.places[0] * search.places[1];
-    if (all == 0)
-        return 0;
-    search.all = tries >= all;
-    search.tries = search.all ? (int)all : tries;
-    search.chunk_size = rf_max_int((search.tries + MAX_CHUNKS - 1) / MAX_CHUNKS, 16);
-    int chunks = (search.tries + search.chunk_size - 1) / search.chunk_size;
-    RfMatch found[MAX_CHUNKS * MAX_KEEP];
-    search.best = found;
-    rf_parallel_for(chunks, search_chunk, &search);
+    assert(keep >= 1);
+    int places[2], margin = window->texture->tiles ? 0 : window->margin;
+    rf_match_places(window, places);
+    int64_t all = (int64_t)places[0] * places[1];
+    bool every = tries >= all;
+    if (every)
+        tries = (int)all;
     for (int k = 0; k < keep; ++k)
         best[k] = (RfMatch){0, 0, INFINITY};
-    for (int i = 0; i < chunks * keep; ++i)
-        insert_match(best, keep, found[i]);
+    for (int i = 0; i < tries; ++i)
+    {
+        uint32_t place = every ? (uint32_t)i : rf_random_below((uint32_t)all, seed, frame, item, (uint64_t)i + 16);
+        RfMatch match = {(int)place % places[0] + margin, (int)place / places[0] + margin, 0};
+        rf_match_cost(window, match.x, match.y, &match.cost);
+        insert_match(best, keep, match);
+    }
     int count = 0;
     while (count < keep && best[count].cost < INFINITY)
         ++count;

@@ -29,6 +29,6 @@ typedef struct RfMatch
 } RfMatch;
 
 /// The `keep` best of `tries` random places (all of them in order, if there are no more), best first; ties go to the
-/// earlier try. keep <= 8. Returns how many were found.
+/// earlier try. Returns how many were found.
 int rf_match_search(const RfMatchWindow *window, int tries, int keep, uint64_t seed, uint64_t frame, uint64_t item,
                     RfMatch *best);

@@ -43,7 +43,7 @@ enum
 {
     MAX_TAPS = 4,
     WIDE = 16,
-    TILE_PIXELS = RF_TILE_SPAN * RF_TILE_SPAN
+    TILE_PIXELS = RF_TILE_ROWS * RF_TILE_COLUMNS
 };
 
 RfResult rf_tile_create(int quads, RfArena *arena, RfTileSums *out)
@@ -71,7 +71,7 @@ void rf_tile_clear(RfTileSums *sums, int quads)
 // Columns of each row that a grid has written to.
 typedef struct Extent
 {
-    int first[RF_TILE_SPAN], end[RF_TILE_SPAN];
+    int first[RF_TILE_ROWS], end[RF_TILE_ROWS];
 } Extent;
 
 typedef struct Filter
@@ -107,7 +107,8 @@ RF_WIDE_BODY Region region_of(const RfDrawJob *job, const RfDrawGrid *grid)
 
 typedef struct Corner
 {
-    float x, y, value[4]; // u, v, K_g, K_d
+    float x, y;
+    Vec4 value; // u, v, K_g K_d, nothing
 } Corner;
 
 // A grid's vertices in tile pixels, and on which sides of the region they lie.
@@ -139,7 +140,7 @@ RF_WIDE_BODY Corner corner_of(const RfDrawGrid *grid, const Vertices *vertices, 
     return (Corner){
         vertices->x[k],
         vertices->y[k],
-        {grid->u0 + (float)i * grid->cell, grid->v0 + (float)j * grid->cell, border ? 0.0f : 1.0f, grid->quality[k]}};
+        {grid->u0 + (float)i * grid->cell, grid->v0 + (float)j * grid->cell, border ? 0.0f : grid->quality[k], 0}};
 }
 
 RF_WIDE_BODY bool is_above(const Corner *p, const Corner *q)
@@ -147,22 +148,21 @@ RF_WIDE_BODY bool is_above(const Corner *p, const Corner *q)
     return p->y < q->y || (p->y == q->y && p->x < q->x);
 }
 
-// Writes `count` pixels from (first, y); base and dx hold the four values there and their slopes along x.
-RF_WIDE_BODY void write_pixels(RfTilePlanes *planes, int place, int count, const float base[4], const float dx[4])
+// Writes `count` pixels; base and dx hold the values at the first and their slopes along x.
+RF_WIDE_BODY void write_pixels(RfTilePlanes *planes, int place, int count, Vec4 base, Vec4 dx)
 {
     float *restrict u = planes->u + place, *restrict v = planes->v + place, *restrict weight = planes->weight + place;
-    float u0 = base[0], v0 = base[1], g0 = base[2], q0 = base[3], du = dx[0], dv = dx[1], dg = dx[2], dq = dx[3];
+    float u0 = base[0], v0 = base[1], w0 = base[2], du = dx[0], dv = dx[1], dw = dx[2];
     for (int block = 0; block < count; block += WIDE)
 #pragma omp simd
         for (int k = block; k < block + WIDE; ++k)
         {
             float along = (float)k;
-            float g = rf_min(rf_max(g0 + along * dg, 0), 1), q = rf_min(rf_max(q0 + along * dq, 0), 1);
             if (k < count)
             {
                 u[k] = u0 + along * du;
                 v[k] = v0 + along * dv;
-                weight[k] = g * q;
+                weight[k] = rf_max(w0 + along * dw, 0);
             }
         }
 }
@@ -186,14 +186,10 @@ RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, cons
     float abx = b->x - a->x, aby = b->y - a->y, acx = c->x - a->x, acy = c->y - a->y, det = abx * acy - aby * acx;
     if (!(det > 1e-6f || det < -1e-6f))
         return;
-    float dx[4], dy[4], start[4], inverse = 1 / det;
-    for (int k = 0; k < 4; ++k)
-    {
-        float ab = b->value[k] - a->value[k], ac = c->value[k] - a->value[k];
-        dx[k] = (ab * acy - ac * aby) * inverse;
-        dy[k] = (ac * abx - ab * acx) * inverse;
-        start[k] = a->value[k] + (0.5f - a->x) * dx[k] + (0.5f - a->y) * dy[k];
-    }
+    float inverse = 1 / det;
+    Vec4 ab = b->value - a->value, ac = c->value - a->value;
+    Vec4 dx = (ab * acy - ac * aby) * inverse, dy = (ac * abx - ab * acx) * inverse;
+    Vec4 start = a->value + (0.5f - a->x) * dx + (0.5f - a->y) * dy;
     float slope_ac = slope_of(a, c), slope_ab = slope_of(a, b), slope_bc = slope_of(b, c);
     int first_row = (int)ceilf(rf_max(a->y, region->y0) - 0.5f), end_row = (int)ceilf(rf_min(c->y, region->y1) - 0.5f);
     for (int y = first_row; y < end_row; ++y)
@@ -204,9 +200,7 @@ RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, cons
         int end = (int)ceilf(rf_min(rf_max(along, other), region->x1) - 0.5f);
         if (end <= first)
             continue;
-        float base[4];
-        for (int k = 0; k < 4; ++k)
-            base[k] = start[k] + (float)first * dx[k] + (float)y * dy[k];
+        Vec4 base = start + (float)first * dx + (float)y * dy;
         write_pixels(planes, y * RF_TILE_PITCH + first, end - first, base, dx);
         extent->first[y] = rf_min_int(extent->first[y], first);
         extent->end[y] = rf_max_int(extent->end[y], end);
@@ -215,10 +209,10 @@ RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, cons
 
 RF_WIDE_BODY void rasterise(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, Extent *extent)
 {
-    assert(job->width <= RF_TILE_SPAN && job->height <= RF_TILE_SPAN);
-    for (int y = 0; y < RF_TILE_SPAN; ++y)
+    assert(job->width <= RF_TILE_COLUMNS && job->height <= RF_TILE_ROWS);
+    for (int y = 0; y < RF_TILE_ROWS; ++y)
     {
-        extent->first[y] = RF_TILE_SPAN;
+        extent->first[y] = RF_TILE_COLUMNS;
         extent->end[y] = 0;
     }
     Region region = region_of(job, grid);
@@ -401,7 +395,7 @@ RF_WIDE_BODY void sum_row(const RfDrawJob *job, const RfDrawGrid *grid, const Fi
 {
     const RfTextureLevel *level = &job->texture->levels[filter->level];
     const float *u = sums->planes->u + y * RF_TILE_PITCH, *v = sums->planes->v + y * RF_TILE_PITCH;
-    size_t place = (size_t)y * RF_TILE_SPAN;
+    size_t place = (size_t)y * RF_TILE_COLUMNS;
     float share = 1 / (float)filter->taps;
     for (int tap = 0; tap < filter->taps; ++tap)
     {
@@ -433,7 +427,7 @@ RF_WIDE_BODY void sum_row(const RfDrawJob *job, const RfDrawGrid *grid, const Fi
 
 RF_WIDE_BODY void keep_lattice(const Row *row, int y, float *lattice)
 {
-    float *to = lattice + y / RF_LATTICE_STEP * RF_LATTICE_SPAN;
+    float *to = lattice + y / RF_LATTICE_STEP * RF_LATTICE_COLUMNS;
     for (int x = (row->first + RF_LATTICE_STEP - 1) / RF_LATTICE_STEP * RF_LATTICE_STEP; x < row->end;
          x += RF_LATTICE_STEP)
         to[x / RF_LATTICE_STEP] = row->weight[x];
@@ -505,7 +499,7 @@ RF_WIDE_BODY void rf_tile_layers_body(const RfDrawJob *job, const RfDrawGrid *gr
             continue;
         weigh_row(job, grid, planes->weight + y * RF_TILE_PITCH, y, &row);
         for (int x = row.first; x < row.end; ++x)
-            insert_layer(&layers[y * RF_TILE_SPAN + x], planes->u[y * RF_TILE_PITCH + x],
+            insert_layer(&layers[y * RF_TILE_COLUMNS + x], planes->u[y * RF_TILE_PITCH + x],
                          planes->v[y * RF_TILE_PITCH + x], row.weight[x], grid->id);
     }
 }

@@ -8,16 +8,19 @@
 
 enum
 {
-    /// Pixels along a tile's side. A tile is drawn with one more row and column, so that the lattice below reaches its
-    /// border.
-    RF_TILE = 64,
-    RF_TILE_SPAN = RF_TILE + 1,
+    /// Pixels of a tile: wide rather than square, since its rows are what is worked on. A tile is drawn with one more
+    /// row and column, so that the lattice below reaches its border.
+    RF_TILE_WIDTH = 128,
+    RF_TILE_HEIGHT = 64,
+    RF_TILE_COLUMNS = RF_TILE_WIDTH + 1,
+    RF_TILE_ROWS = RF_TILE_HEIGHT + 1,
     /// Row stride of a tile's planes: whole vectors.
-    RF_TILE_PITCH = (RF_TILE_SPAN + 15) / 16 * 16,
+    RF_TILE_PITCH = (RF_TILE_COLUMNS + 15) / 16 * 16,
     /// Weights of single grids are kept at every RF_LATTICE_STEP-th pixel, for the correlation of grids that overlap.
     RF_LATTICE_STEP = 8,
-    RF_LATTICE_SPAN = RF_TILE / RF_LATTICE_STEP + 1,
-    RF_LATTICE_POINTS = RF_LATTICE_SPAN * RF_LATTICE_SPAN
+    RF_LATTICE_COLUMNS = RF_TILE_WIDTH / RF_LATTICE_STEP + 1,
+    RF_LATTICE_ROWS = RF_TILE_HEIGHT / RF_LATTICE_STEP + 1,
+    RF_LATTICE_POINTS = RF_LATTICE_COLUMNS * RF_LATTICE_ROWS
 };
 
 /// A grid as drawing sees it. Vertex (i, j) is number j * n + i and stands for the exemplar coordinates u0 + i * cell,
@@ -50,7 +53,8 @@ typedef struct RfDrawJob
     float sharpness;
     /// For each quad: 0 as it is; 1 normals (x right, y up); 2 vectors (x right, y down), turned with the grid.
     int turned[RF_TEXTURE_QUADS];
-    /// Pixel (i, j) of the tile is centred on origin + (i + 0.5, j + 0.5) * spacing; width, height <= RF_TILE_SPAN.
+    /// Pixel (i, j) of the tile is centred on origin + (i + 0.5, j + 0.5) * spacing; width <= RF_TILE_COLUMNS, height
+    /// <= RF_TILE_ROWS.
     RfVec2 origin;
     float spacing;
     int width, height;
@@ -62,11 +66,11 @@ typedef struct RfDrawJob
 /// two grids.
 typedef struct RfTilePlanes
 {
-    float u[RF_TILE_SPAN * RF_TILE_PITCH], v[RF_TILE_SPAN * RF_TILE_PITCH], weight[RF_TILE_SPAN * RF_TILE_PITCH];
+    float u[RF_TILE_ROWS * RF_TILE_PITCH], v[RF_TILE_ROWS * RF_TILE_PITCH], weight[RF_TILE_ROWS * RF_TILE_PITCH];
 } RfTilePlanes;
 
-/// Sums over the grids drawn so far. colour: [quads][RF_TILE_SPAN * RF_TILE_SPAN][4], of w (T - m); the others:
-/// [RF_TILE_SPAN * RF_TILE_SPAN], row stride RF_TILE_SPAN.
+/// Sums over the grids drawn so far. colour: [quads][RF_TILE_ROWS * RF_TILE_COLUMNS][4], of w (T - m); the others:
+/// [RF_TILE_ROWS * RF_TILE_COLUMNS], row stride RF_TILE_COLUMNS.
 typedef struct RfTileSums
 {
     float *colour;
@@ -84,7 +88,7 @@ void rf_tile_clear(RfTileSums *sums, int quads);
 /// nothing; pixels_drawn grows by the samples taken.
 void rf_tile_draw(const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice, int64_t *samples);
 
-/// The four strongest grids a pixel, strongest first: [RF_TILE_SPAN * RF_TILE_SPAN].
+/// The four strongest grids a pixel, strongest first: [RF_TILE_ROWS * RF_TILE_COLUMNS].
 typedef struct RfTileLayer
 {
     float u[4], v[4], weight[4];

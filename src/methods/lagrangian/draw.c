@@ -23,7 +23,7 @@ enum
     // Grids of a tile whose correlations count; 31 is the most seen in the built-in scenes at the default radius. The
     // rest blend as independent.
     MAX_CORRELATED = 48,
-    TILE_PIXELS = RF_TILE_SPAN * RF_TILE_SPAN
+    TILE_PIXELS = RF_TILE_ROWS * RF_TILE_COLUMNS
 };
 
 // Pictures that contradict each other are not pulled further apart than this.
@@ -69,7 +69,7 @@ typedef struct Scratch
 {
     RfTileSums sums;
     float *lattice;
-    // Texture values of a row of the tile, [lanes / 4][RF_TILE][4].
+    // Texture values of a row of the tile, [lanes / 4][RF_TILE_WIDTH][4].
     float *values;
     int *place;
 } Scratch;
@@ -93,10 +93,10 @@ static bool visible_tiles(const FrameJob *job, const RfDrawGrid *grid, int range
     if (!(grid->fade > 0) || !(grid->x1 > grid->x0) || !(grid->y1 > grid->y0))
         return false;
     // A tile reaches one pixel into the next.
-    range[0] = rf_max_int((int)floorf((grid->x0 - 1) / RF_TILE), 0);
-    range[1] = rf_min_int((int)floorf(grid->x1 / RF_TILE), job->columns - 1);
-    range[2] = rf_max_int((int)floorf((grid->y0 - 1) / RF_TILE), 0);
-    range[3] = rf_min_int((int)floorf(grid->y1 / RF_TILE), job->rows - 1);
+    range[0] = rf_max_int((int)floorf((grid->x0 - 1) / RF_TILE_WIDTH), 0);
+    range[1] = rf_min_int((int)floorf(grid->x1 / RF_TILE_WIDTH), job->columns - 1);
+    range[2] = rf_max_int((int)floorf((grid->y0 - 1) / RF_TILE_HEIGHT), 0);
+    range[3] = rf_min_int((int)floorf(grid->y1 / RF_TILE_HEIGHT), job->rows - 1);
     return grid->x1 > 0 && grid->y1 > 0;
 }
 
@@ -138,7 +138,7 @@ static RfResult scratch_create(RfLagrangian *l, int worker, Scratch *out)
     size_t lanes = (size_t)l->material.lane_count;
     RF_TRY(rf_tile_create(l->material.texture.quads, arena, &out->sums));
     out->lattice = rf_arena_push(arena, (size_t)MAX_CORRELATED * RF_LATTICE_POINTS, sizeof(float));
-    out->values = rf_arena_push(arena, lanes * RF_TILE, sizeof(float));
+    out->values = rf_arena_push(arena, lanes * RF_TILE_WIDTH, sizeof(float));
     out->place = rf_arena_push(arena, (size_t)l->count, sizeof(int));
     if (!out->lattice || !out->values || !out->place)
         return RF_OUT_OF_MEMORY;
@@ -213,9 +213,9 @@ static void mix_correlations(const FrameJob *job, Scratch *scratch, const int *o
 
 static void interpolate_rho(const float *lattice, int y, float *row)
 {
-    const float *upper = lattice + y / RF_LATTICE_STEP * RF_LATTICE_SPAN, *lower = upper + RF_LATTICE_SPAN;
+    const float *upper = lattice + y / RF_LATTICE_STEP * RF_LATTICE_COLUMNS, *lower = upper + RF_LATTICE_COLUMNS;
     float t = (float)(y % RF_LATTICE_STEP) / RF_LATTICE_STEP;
-    for (int x = 0; x < RF_TILE; ++x)
+    for (int x = 0; x < RF_TILE_WIDTH; ++x)
     {
         int i = x / RF_LATTICE_STEP;
         float s = (float)(x % RF_LATTICE_STEP) / RF_LATTICE_STEP;
@@ -247,7 +247,7 @@ static void write_pixel(const RfLagrangian *l, const float *values, int x, int l
         for (int c = 0; c < map->image.channels; ++c)
         {
             int lane = m->lane_of_channel[first + c];
-            out[c] = values[((size_t)(lane / 4) * RF_TILE + (size_t)x) * 4 + (size_t)(lane % 4)];
+            out[c] = values[((size_t)(lane / 4) * RF_TILE_WIDTH + (size_t)x) * 4 + (size_t)(lane % 4)];
         }
         if (m->histograms[i].channels > 0)
         {
@@ -273,20 +273,37 @@ static bool is_simple(const RfLagrangian *l)
            !l->material.turned[0];
 }
 
+static void write_simple_row(const float *restrict weight, const float *restrict values, int width, float *restrict out,
+                             int64_t *holes)
+{
+    int missing = 0;
+    for (int x = 0; x < width; ++x)
+    {
+        missing += !(weight[x] > 0);
+        for (int c = 0; c < 3; ++c)
+            out[3 * x + c] = values[4 * x + c];
+    }
+    *holes += missing;
+}
+
 static void resolve_row(const FrameJob *job, Scratch *scratch, const float *rho, int x0, int y, int row, int width,
                         int64_t *holes)
 {
     const RfLagrangian *l = job->l;
     int channels = job->frame.channels;
-    float inverse_sum[RF_TILE], inverse_norm[RF_TILE];
-    size_t place = (size_t)row * RF_TILE_SPAN;
+    float inverse_sum[RF_TILE_WIDTH], inverse_norm[RF_TILE_WIDTH];
+    size_t place = (size_t)row * RF_TILE_COLUMNS;
     const float *weight = scratch->sums.weight + place;
     rf_resolve_scales(weight, scratch->sums.weight2 + place, rho, width, inverse_sum, inverse_norm);
     for (int q = 0; q < l->material.texture.quads; ++q)
         rf_resolve_row(scratch->sums.colour + ((size_t)q * TILE_PIXELS + place) * 4, inverse_sum, inverse_norm,
-                       &job->quads[q], width, scratch->values + (size_t)q * RF_TILE * 4);
+                       &job->quads[q], width, scratch->values + (size_t)q * RF_TILE_WIDTH * 4);
     float *out = job->frame.pixels + y * job->frame.row_stride + (ptrdiff_t)x0 * channels;
-    bool simple = is_simple(l);
+    if (is_simple(l) && !job->flow->view->mask)
+    {
+        write_simple_row(weight, scratch->values, width, out, holes);
+        return;
+    }
     for (int x = 0; x < width; ++x, out += channels)
     {
         if (!pixel_in_fluid(job->flow, x0 + x, y))
@@ -295,13 +312,8 @@ static void resolve_row(const FrameJob *job, Scratch *scratch, const float *rho,
             continue;
         }
         *holes += !(weight[x] > 0);
-        if (simple)
-            memcpy(out, scratch->values + 4 * x, 3 * sizeof *out);
-        else
-        {
-            int level = weight[x] > 0 ? (int)(scratch->sums.level[place + (size_t)x] / weight[x] + 0.5f) : 0;
-            write_pixel(l, scratch->values, x, level, out);
-        }
+        int level = weight[x] > 0 ? (int)(scratch->sums.level[place + (size_t)x] / weight[x] + 0.5f) : 0;
+        write_pixel(l, scratch->values, x, level, out);
     }
 }
 
@@ -310,13 +322,13 @@ static void draw_tile(void *context, int tile, int worker)
     FrameJob *job = context;
     const RfLagrangian *l = job->l;
     Scratch *scratch = &job->scratch[worker];
-    int x0 = tile % job->columns * RF_TILE, y0 = tile / job->columns * RF_TILE;
+    int x0 = tile % job->columns * RF_TILE_WIDTH, y0 = tile / job->columns * RF_TILE_HEIGHT;
     RfDrawJob draw = {.texture = &l->material.texture,
                       .sharpness = l->options.sharpness,
                       .origin = {(float)x0, (float)y0},
                       .spacing = 1,
-                      .width = RF_TILE_SPAN,
-                      .height = RF_TILE_SPAN};
+                      .width = RF_TILE_COLUMNS,
+                      .height = RF_TILE_ROWS};
     memcpy(draw.turned, l->material.turned, sizeof draw.turned);
     const int *order = job->order + job->first[tile];
     int count = job->first[tile + 1] - job->first[tile], correlated = rf_min_int(count, MAX_CORRELATED);
@@ -327,9 +339,9 @@ static void draw_tile(void *context, int tile, int worker)
         float *lattice = i < correlated ? scratch->lattice + (size_t)i * RF_LATTICE_POINTS : NULL;
         rf_tile_draw(&draw, &job->grids[order[i]], &scratch->sums, lattice, &samples);
     }
-    float rho[RF_LATTICE_POINTS], row_rho[RF_TILE];
+    float rho[RF_LATTICE_POINTS], row_rho[RF_TILE_WIDTH];
     mix_correlations(job, scratch, order, correlated, rho);
-    int width = rf_min_int(RF_TILE, l->width - x0), height = rf_min_int(RF_TILE, l->height - y0);
+    int width = rf_min_int(RF_TILE_WIDTH, l->width - x0), height = rf_min_int(RF_TILE_HEIGHT, l->height - y0);
     for (int row = 0; row < height; ++row)
     {
         interpolate_rho(rho, row, row_rho);
@@ -344,8 +356,8 @@ RfResult frame_draw(RfLagrangian *l, const StepFlow *flow, const RfImageView *fr
     FrameJob job = {.l = l,
                     .flow = flow,
                     .frame = *frame,
-                    .columns = (l->width + RF_TILE - 1) / RF_TILE,
-                    .rows = (l->height + RF_TILE - 1) / RF_TILE};
+                    .columns = (l->width + RF_TILE_WIDTH - 1) / RF_TILE_WIDTH,
+                    .rows = (l->height + RF_TILE_HEIGHT - 1) / RF_TILE_HEIGHT};
     int tiles = job.columns * job.rows;
     RF_TRY(bin_grids(l, &job));
     fill_quads(&l->material, job.quads);
@@ -380,7 +392,7 @@ static void write_layers(const LayersJob *job, const RfTileLayer *tile, int x0, 
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
         {
-            const RfTileLayer *layer = &tile[y * RF_TILE_SPAN + x];
+            const RfTileLayer *layer = &tile[y * RF_TILE_COLUMNS + x];
             float *out = job->layers.pixels + (y0 + y) * job->layers.row_stride + (ptrdiff_t)(x0 + x) * 16;
             for (int k = 0; k < 4; ++k)
             {
@@ -399,13 +411,13 @@ static void layer_tile(void *context, int tile, int worker)
     const RfLagrangian *l = job->l;
     RfTileLayer *layers = job->tiles[worker];
     memset(layers, 0, TILE_PIXELS * sizeof *layers);
-    int x0 = tile % job->columns * RF_TILE, y0 = tile / job->columns * RF_TILE;
+    int x0 = tile % job->columns * RF_TILE_WIDTH, y0 = tile / job->columns * RF_TILE_HEIGHT;
     RfDrawJob draw = {.texture = &l->material.texture,
                       .sharpness = l->options.sharpness,
                       .origin = {(float)x0, (float)y0},
                       .spacing = 1,
-                      .width = rf_min_int(RF_TILE, l->width - x0),
-                      .height = rf_min_int(RF_TILE, l->height - y0)};
+                      .width = rf_min_int(RF_TILE_WIDTH, l->width - x0),
+                      .height = rf_min_int(RF_TILE_HEIGHT, l->height - y0)};
     for (int g = 0; g < l->count; ++g)
     {
         RfDrawGrid grid = draw_grid_of(l, g, l->time);
@@ -423,7 +435,7 @@ RfResult rf_lagrangian_layers(const RfLagrangian *l, const RfImageView *layers)
     RF_REQUIRE(layers->channels == 16 && layers->width == l->width && layers->height == l->height,
                "rf_lagrangian_layers: %d x %d pixels of %d channels: must be %d x %d of 16", layers->width,
                layers->height, layers->channels, l->width, l->height);
-    LayersJob job = {.l = l, .layers = *layers, .columns = (l->width + RF_TILE - 1) / RF_TILE};
+    LayersJob job = {.l = l, .layers = *layers, .columns = (l->width + RF_TILE_WIDTH - 1) / RF_TILE_WIDTH};
     int workers = rf_threads();
     RfTileLayer *memory = rf_allocate((size_t)workers * TILE_PIXELS, sizeof *memory);
     job.planes = rf_allocate_zero((size_t)workers, sizeof *job.planes);
@@ -435,7 +447,7 @@ RfResult rf_lagrangian_layers(const RfLagrangian *l, const RfImageView *layers)
     }
     for (int i = 0; i < workers; ++i)
         job.tiles[i] = memory + (size_t)i * TILE_PIXELS;
-    rf_parallel_for(job.columns * ((l->height + RF_TILE - 1) / RF_TILE), layer_tile, &job);
+    rf_parallel_for(job.columns * ((l->height + RF_TILE_HEIGHT - 1) / RF_TILE_HEIGHT), layer_tile, &job);
     rf_release(memory);
     rf_release(job.planes);
     return RF_OK;

@@ -53,7 +53,8 @@ typedef struct Birth
 {
     RfLagrangian *l;
     RfVec2 centre;
-    int index;
+    /// The new grid, and the number of grids before it that it is matched to.
+    int index, older;
     int overlaps[MAX_OVERLAPS], overlap_count;
 } Birth;
 
@@ -61,7 +62,7 @@ static RfResult patch_create(const RfLagrangian *l, RfVec2 centre, int halvings,
                              Patch *out)
 {
     float spacing = (float)(1 << halvings);
-    int side = rf_clamp_int((int)ceilf(2 * radius / spacing), 3, RF_TILE_SPAN);
+    int side = rf_clamp_int((int)ceilf(2 * radius / spacing), 3, RF_TILE_ROWS);
     const Material *m = &l->material;
     out->job = (RfDrawJob){.texture = &m->texture,
                            .sharpness = l->options.sharpness,
@@ -79,7 +80,7 @@ static void find_overlaps(Birth *birth)
     const RfLagrangian *l = birth->l;
     float reach = KERNEL_RADIUS * l->radius;
     birth->overlap_count = 0;
-    for (int i = 0; i < birth->index && birth->overlap_count < MAX_OVERLAPS; ++i)
+    for (int i = 0; i < birth->older && birth->overlap_count < MAX_OVERLAPS; ++i)
         if (rf_vec2_length(rf_vec2_sub(l->grids[i].centre, birth->centre)) < 2 * reach)
             birth->overlaps[birth->overlap_count++] = i;
 }
@@ -98,7 +99,7 @@ static void draw_overlaps(const Birth *birth, Patch *patch)
 static float weight_at_centre(const Birth *birth, const Patch *patch)
 {
     int middle = patch->job.width / 2;
-    return powf(patch->sums.weight[middle * RF_TILE_SPAN + middle], 1 / birth->l->options.sharpness);
+    return powf(patch->sums.weight[middle * RF_TILE_COLUMNS + middle], 1 / birth->l->options.sharpness);
 }
 
 // Turns a patch into a window to search for: colours blended as a frame's are, weighted by the new grid's kernel where
@@ -118,12 +119,12 @@ static RfResult window_create(const Birth *birth, const Patch *patch, int halvin
         for (int y = 0; y < side; ++y)
             for (int x = 0; x < side; ++x)
             {
-                size_t pixel = (size_t)y * RF_TILE_SPAN + (size_t)x;
+                size_t pixel = (size_t)y * RF_TILE_COLUMNS + (size_t)x;
                 float w2 = patch->sums.weight2[pixel], scale = w2 > 0 ? 1 / sqrtf(w2) : 0;
                 float dx = ((float)x + 0.5f - 0.5f * (float)side) * spacing,
                       dy = ((float)y + 0.5f - 0.5f * (float)side) * spacing;
                 float kernel = w2 > 0 ? fmaxf(1 - sqrtf(dx * dx + dy * dy) / reach, 0) : 0;
-                const float *colour = patch->sums.colour + ((size_t)q * RF_TILE_SPAN * RF_TILE_SPAN + pixel) * 4;
+                const float *colour = patch->sums.colour + ((size_t)q * RF_TILE_ROWS * RF_TILE_COLUMNS + pixel) * 4;
                 for (int c = 0; c < 4; ++c, ++k)
                 {
                     target[k] = colour[c] * scale;
@@ -265,14 +266,14 @@ static float correlation(const Material *m, const Patch *mine, const Patch *othe
     for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x)
         {
-            size_t pixel = (size_t)y * RF_TILE_SPAN + (size_t)x;
+            size_t pixel = (size_t)y * RF_TILE_COLUMNS + (size_t)x;
             float wi = mine->sums.weight[pixel], wj = other->sums.weight[pixel];
             if (!(wi > 0) || !(wj > 0))
                 continue;
             for (int q = 0; q < m->texture.quads; ++q)
                 for (int c = 0; c < 4 && !m->turned[q]; ++c)
                 {
-                    size_t place = ((size_t)q * RF_TILE_SPAN * RF_TILE_SPAN + pixel) * 4 + (size_t)c;
+                    size_t place = ((size_t)q * RF_TILE_ROWS * RF_TILE_COLUMNS + pixel) * 4 + (size_t)c;
                     float weight = m->match_weight[4 * q + c], a = mine->sums.colour[place],
                           b = other->sums.colour[place];
                     cross += (double)(weight * a * b);
@@ -343,34 +344,73 @@ static void place_vertices(RfLagrangian *l, int index, RfVec2 centre)
 static RfResult give_birth(RfLagrangian *l, const StepFlow *flow, RfVec2 centre)
 {
     RF_TRY(grids_reserve(l, l->count + 1));
-    Birth birth = {.l = l, .centre = centre, .index = l->count};
-    Grid *grid = &l->grids[birth.index];
-    *grid = (Grid){.id = l->next_id, .birth = l->time, .centre = centre};
-    place_vertices(l, birth.index, centre);
-    grids_measure_new(l, flow, birth.index);
-    find_overlaps(&birth);
+    l->grids[l->count] = (Grid){.id = l->next_id, .birth = l->time, .centre = centre};
+    place_vertices(l, l->count, centre);
+    grids_measure_new(l, flow, l->count);
+    ++l->count;
+    ++l->next_id;
+    ++l->stats.born;
+    return RF_OK;
+}
 
-    RfArena *arena = &l->workers[0];
+// What a new grid shows, how it comes in and what it resembles.
+static RfResult dress(Birth *birth, const StepFlow *flow, RfArena *arena)
+{
+    RfLagrangian *l = birth->l;
+    Grid *grid = &l->grids[birth->index];
+    birth->centre = grid->centre;
+    find_overlaps(birth);
     int halvings = coarsest_halvings(l);
     Patch patch;
     RfVec2 offset;
-    RF_TRY(patch_create(l, centre, halvings, l->radius, arena, &patch));
-    draw_overlaps(&birth, &patch);
-    RF_TRY(choose_area(&birth, &patch, halvings, arena, &offset));
+    RF_TRY(patch_create(l, birth->centre, halvings, l->radius, arena, &patch));
+    draw_overlaps(birth, &patch);
+    RF_TRY(choose_area(birth, &patch, halvings, arena, &offset));
     float half = 0.5f * GRID_SIDE * l->radius;
-    grid->u0 = centre.x - half + offset.x;
-    grid->v0 = centre.y - half + offset.y;
-    if (l->started && weight_at_centre(&birth, &patch) >= UNCOVERED)
+    grid->u0 = birth->centre.x - half + offset.x;
+    grid->v0 = birth->centre.y - half + offset.y;
+    if (l->started && weight_at_centre(birth, &patch) >= UNCOVERED)
     {
         grid->fade_in = fade_length(l, grid->strain);
         grid->birth = flow->from;
     }
     if (l->options.candidates > 1 && l->options.blend != RF_BLEND_PLAIN)
-        RF_TRY(measure_resemblances(&birth, halvings, arena));
+        RF_TRY(measure_resemblances(birth, halvings, arena));
+    return RF_OK;
+}
+
+typedef struct DressJob
+{
+    RfLagrangian *l;
+    const StepFlow *flow;
+    int first;
+    RfResult *results;
+} DressJob;
+
+static void dress_one(void *context, int item, int worker)
+{
+    DressJob *job = context;
+    RfArena *arena = &job->l->workers[worker];
+    // In the first step every grid sees those before it. Later ones see only those of earlier steps, so that they can
+    // be dressed at the same time: what came in this very step has next to no weight yet.
+    Birth birth = {.l = job->l, .index = job->first + item, .older = job->l->started ? job->first : job->first + item};
+    job->results[item] = dress(&birth, job->flow, arena);
     rf_arena_reset(arena);
-    ++l->count;
-    ++l->next_id;
-    ++l->stats.born;
+}
+
+static RfResult dress_all(RfLagrangian *l, const StepFlow *flow, int first)
+{
+    int count = l->count - first;
+    DressJob job = {l, flow, first, rf_arena_push(&l->arena, (size_t)count, sizeof *job.results)};
+    if (!job.results)
+        return RF_OUT_OF_MEMORY;
+    if (l->started)
+        rf_parallel_for(count, dress_one, &job);
+    else
+        for (int i = 0; i < count; ++i)
+            dress_one(&job, i, 0);
+    for (int i = 0; i < count; ++i)
+        RF_TRY(job.results[i]);
     return RF_OK;
 }
 
@@ -397,7 +437,7 @@ RfResult grids_refill(RfLagrangian *l, const StepFlow *flow)
         if (!l->grids[i].retired)
             rf_disk_field_mark(&field, l->grids[i].centre);
     RF_TRY(rf_disk_field_list(&field, &l->arena));
-    int cell;
+    int cell, first = l->count;
     for (uint64_t draw = 0; (cell = rf_disk_field_pick(&field, l->options.seed, l->step, draw)) >= 0; ++draw)
     {
         RfVec2 point;
@@ -407,5 +447,5 @@ RfResult grids_refill(RfLagrangian *l, const StepFlow *flow)
         RF_TRY(give_birth(l, flow, point));
         rf_disk_field_mark(&field, point);
     }
-    return RF_OK;
+    return dress_all(l, flow, first);
 }
