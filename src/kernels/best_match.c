@@ -1,7 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plain comparison of windows, many places at once. Windows are a few hundred pixels and places a few thousand, at a
-// coarse level, so the comparison runs from the first cache and needs no transform; the caller refines the best few
-// places at finer levels.
+// Plain comparison of windows. They are some thousand numbers, at a coarse level, so the comparison runs from the first
+// caches and needs no transform; the caller refines the best few places at finer levels.
+//
+// The sum of squared differences alone, |e - t|^2, is least where e is a *fainter* t: with correlation c and r = |e| /
+// |t| it is |t|^2 (1 + r^2 - 2 r c), least at r = c < 1. Chosen again and again, calm areas win and the texture loses
+// contrast and its spectrum. So likeness counts as correlation alone, and the window's energy is judged for itself
+// against the exemplar's mean m^2:
+//
+//     cost = 2 - 2 c + 3 (|e|^2 / m^2 - 1)^2
+//
+// The penalty is even in the energy itself, not in its root or logarithm, so that the mean energy of what is chosen
+// stays the exemplar's. A like penalty on the mean squared gradient of the full texture was tried; it moved no measure
+// by more than another seed does.
 
 #include "kernels/best_match.h"
 #include "core/maths.h"
@@ -10,26 +20,32 @@
 
 #include <assert.h>
 
-RF_WIDE_BODY void match_row_body(const float *restrict texels, const float *restrict target,
-                                 const float *restrict weight, int count, float *restrict sum)
+// With a twelfth of it the contrast of noise drifts by 7 %.
+#define ENERGY_WEIGHT 3.0f
+
+// sums[0] += weight (e - t)^2, sums[1] += weight e^2
+RF_WIDE_BODY void match_row(const float *restrict texels, const float *restrict target, const float *restrict weight,
+                            int count, float sums[2])
 {
-    float total = 0;
-#pragma omp simd reduction(+ : total)
+    float difference = 0, energy = 0;
+#pragma omp simd reduction(+ : difference, energy)
     for (int i = 0; i < count; ++i)
     {
-        float d = texels[i] - target[i];
-        total += weight[i] * d * d;
+        float e = texels[i], d = e - target[i];
+        difference += weight[i] * d * d;
+        energy += weight[i] * e * e;
     }
-    *sum += total;
+    sums[0] += difference;
+    sums[1] += energy;
 }
 
 RF_WIDE_BODY void rf_match_cost_body(const RfMatchWindow *window, int x, int y, float *cost)
 {
     const RfTexture *texture = window->texture;
     const RfTextureLevel *level = &texture->levels[window->level];
-    // A row of the window is one stretch of texels, or two where it wraps.
+    // A row of the window is one stretch of texels, or more where it wraps.
     int first = rf_min_int(window->width, level->width - x);
-    float total = 0;
+    float sums[2] = {0, 0};
     for (int q = 0; q < texture->quads; ++q)
     {
         const float *plane = level->texels + (size_t)q * rf_texture_plane(level);
@@ -39,13 +55,21 @@ RF_WIDE_BODY void rf_match_cost_body(const RfMatchWindow *window, int x, int y, 
             const float *texels = plane + (size_t)rf_wrap_int(y + j, level->height) * (size_t)level->stride * 4;
             const float *target = window->target + base + (size_t)j * row_floats,
                         *weight = window->weight + base + (size_t)j * row_floats;
-            match_row_body(texels + (size_t)x * 4, target, weight, first * 4, &total);
+            match_row(texels + (size_t)x * 4, target, weight, first * 4, sums);
             for (int done = first; done < window->width; done += level->width)
-                match_row_body(texels, target + (size_t)done * 4, weight + (size_t)done * 4,
-                               rf_min_int(window->width - done, level->width) * 4, &total);
+                match_row(texels, target + (size_t)done * 4, weight + (size_t)done * 4,
+                          rf_min_int(window->width - done, level->width) * 4, sums);
         }
     }
-    *cost = total;
+    // sums[0] = |e|^2 + |t|^2 - 2 e.t
+    float e2 = sums[1], t2 = window->energy, m2 = window->mean_energy, product = sqrtf(e2 * t2);
+    if (!(product > 0) || !(m2 > 0))
+    {
+        *cost = sums[0];
+        return;
+    }
+    float excess = e2 / m2 - 1;
+    *cost = 2 + ENERGY_WEIGHT * excess * excess - (e2 + t2 - sums[0]) / product;
 }
 
 RF_WIDE(rf_match_cost, (const RfMatchWindow *window, int x, int y, float *cost), (window, x, y, cost))

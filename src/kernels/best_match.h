@@ -13,10 +13,15 @@ typedef struct RfMatchWindow
     int margin;
     /// [quads][height][width][4]: the picture, and the weight of every number's squared difference.
     const float *target, *weight;
+    /// Sum of weight * target^2.
+    float energy;
+    /// What it is on average over the exemplar: sum of weight * variance.
+    float mean_energy;
 } RfMatchWindow;
 
-/// Weighted sum of squared differences with the window's first pixel on texel (x, y); wraps where the exemplar tiles,
-/// else the window must fit.
+/// How ill the exemplar fits with the window's first pixel on texel (x, y): 2 - 2 correlation, plus a penalty on energy
+/// unlike the exemplar's mean. Wraps where the exemplar tiles, else the window must fit. Without energies: the bare sum
+/// of squared differences.
 void rf_match_cost(const RfMatchWindow *window, int x, int y, float *cost);
 
 /// Number of places at which the window may lie, along x and y.

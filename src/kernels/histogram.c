@@ -185,19 +185,6 @@ void rf_histogram_free(RfHistogram *histogram)
     histogram->inverse = NULL;
 }
 
-static double level_variance(const RfTextureLevel *level, int lane)
-{
-    const float *plane = level->texels + (size_t)(lane / 4) * rf_texture_plane(level) + lane % 4;
-    double sum = 0;
-    for (int y = 0; y < level->height; ++y)
-        for (int x = 0; x < level->width; ++x)
-        {
-            double value = (double)plane[((size_t)y * (size_t)level->stride + (size_t)x) * 4];
-            sum += value * value;
-        }
-    return sum / ((double)level->width * (double)level->height);
-}
-
 void rf_histogram_fit_levels(RfHistogram *histogram, const RfTexture *texture, const int *lanes)
 {
     const double step = 2 * RF_INVERSE_REACH / (RF_INVERSE_SIZE - 1);
@@ -206,7 +193,7 @@ void rf_histogram_fit_levels(RfHistogram *histogram, const RfTexture *texture, c
         const float *sharp = table_of(histogram, 0, c);
         for (int level = 1; level < texture->level_count; ++level)
         {
-            double lost = sqrt(fmax(1 - level_variance(&texture->levels[level], lanes[c]), 0));
+            double lost = sqrt(fmax(1 - rf_texture_variance(texture, level, lanes[c]), 0));
             float *table = table_of(histogram, level, c);
             int reach = (int)(3 * lost / step);
             for (int i = 0; i < RF_INVERSE_SIZE && reach > 0; ++i)

@@ -184,6 +184,20 @@ RfResult rf_texture_create(const float *pixels, int width, int height, int quads
     return result;
 }
 
+double rf_texture_variance(const RfTexture *texture, int level_number, int lane)
+{
+    const RfTextureLevel *level = &texture->levels[level_number];
+    const float *plane = level->texels + (size_t)(lane / 4) * rf_texture_plane(level) + lane % 4;
+    double sum = 0;
+    for (int y = 0; y < level->height; ++y)
+        for (int x = 0; x < level->width; ++x)
+        {
+            double value = (double)plane[((size_t)y * (size_t)level->stride + (size_t)x) * 4];
+            sum += value * value;
+        }
+    return sum / ((double)level->width * (double)level->height);
+}
+
 void rf_texture_free(RfTexture *texture)
 {
     for (int i = 0; i < RF_TEXTURE_LEVELS; ++i)

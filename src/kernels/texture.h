@@ -38,4 +38,6 @@ static inline size_t rf_texture_plane(const RfTextureLevel *level)
 
 /// pixels: [height][width][4 * quads], mean already removed; copied.
 RfResult rf_texture_create(const float *pixels, int width, int height, int quads, bool tiles, RfTexture *out);
+/// Mean square of a lane (its mean is 0 at level 0) over a level; lane 4 q + c is channel c of quad q.
+double rf_texture_variance(const RfTexture *texture, int level, int lane);
 void rf_texture_free(RfTexture *texture);

@@ -36,6 +36,8 @@ typedef struct Material
     /// the method.
     float mean[MAX_LANES], low[MAX_LANES], high[MAX_LANES], match_weight[MAX_LANES];
     bool plain[MAX_LANES];
+    /// Of every lane at every texture level.
+    float variance[RF_TEXTURE_LEVELS][MAX_LANES];
     int turned[RF_TEXTURE_QUADS];
     /// By map; channels is 0 where the map is not made Gaussian.
     RfHistogram histograms[RF_MAX_MAPS];
@@ -75,6 +77,8 @@ struct RfLagrangian
     const RfExemplar *exemplar;
     RfLagrangianOptions options;
     Material material;
+    /// Halvings of the exemplar at which new grids are matched first.
+    int match_halvings;
     float radius, cell;
     int width, height;
     bool started;
@@ -111,6 +115,7 @@ float grid_fade(const Grid *grid, double time);
 float fade_length(const RfLagrangian *l, float strain);
 
 /// refill.c
+int coarsest_halvings(const RfLagrangian *l);
 RfResult grids_refill(RfLagrangian *l, const StepFlow *flow);
 
 /// draw.c

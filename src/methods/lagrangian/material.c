@@ -123,6 +123,9 @@ RfResult material_create(const RfExemplar *exemplar, RfBlend blend, Material *ou
         material_free(out);
         return result;
     }
+    for (int level = 0; level < out->texture.level_count; ++level)
+        for (int lane = 0; lane < out->lane_count; ++lane)
+            out->variance[level][lane] = (float)rf_texture_variance(&out->texture, level, lane);
     for (int i = 0; i < exemplar->map_count; ++i)
         if (out->histograms[i].channels > 0)
             rf_histogram_fit_levels(&out->histograms[i], &out->texture,

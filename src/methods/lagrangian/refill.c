@@ -58,6 +58,14 @@ typedef struct Birth
     int overlaps[MAX_OVERLAPS], overlap_count;
 } Birth;
 
+int coarsest_halvings(const RfLagrangian *l)
+{
+    int halvings = 0;
+    while ((float)(WINDOW_PIXELS << halvings) < 2 * l->radius && halvings + 2 < l->material.texture.level_count)
+        ++halvings;
+    return halvings;
+}
+
 static RfResult patch_create(const RfLagrangian *l, RfVec2 centre, int halvings, float radius, RfArena *arena,
                              Patch *out)
 {
@@ -102,6 +110,33 @@ static float weight_at_centre(const Birth *birth, const Patch *patch)
     return powf(patch->sums.weight[middle * RF_TILE_COLUMNS + middle], 1 / birth->l->options.sharpness);
 }
 
+static float resemblance_of(const RfLagrangian *l, int a, int b)
+{
+    const Grid *young = &l->grids[a > b ? a : b];
+    uint32_t old = l->grids[a > b ? b : a].id;
+    for (int i = 0; i < young->resemblance_count; ++i)
+        if (young->resemblances[i].id == old)
+            return young->resemblances[i].correlation;
+    return 0;
+}
+
+// Mean correlation of the grids that overlap here, weighted by how much they do.
+static float mean_resemblance(const Birth *birth)
+{
+    const RfLagrangian *l = birth->l;
+    float sum = 0, total = 0, reach = 2 * KERNEL_RADIUS * l->radius;
+    for (int i = 0; i < birth->overlap_count; ++i)
+        for (int j = 0; j < i; ++j)
+        {
+            const Grid *a = &l->grids[birth->overlaps[i]], *b = &l->grids[birth->overlaps[j]];
+            float near = rf_max(1 - rf_vec2_length(rf_vec2_sub(a->centre, b->centre)) / reach, 0);
+            float weight = near * near * grid_fade(a, l->time) * grid_fade(b, l->time);
+            sum += weight * resemblance_of(l, birth->overlaps[i], birth->overlaps[j]);
+            total += weight;
+        }
+    return total > 0 ? rf_clamp(sum / total, 0, 1) : 0;
+}
+
 // Turns a patch into a window to search for: colours blended as a frame's are, weighted by the new grid's kernel where
 // something is drawn.
 static RfResult window_create(const Birth *birth, const Patch *patch, int halvings, RfArena *arena, RfMatchWindow *out)
@@ -115,12 +150,15 @@ static RfResult window_create(const Birth *birth, const Patch *patch, int halvin
         return RF_OUT_OF_MEMORY;
     float reach = KERNEL_RADIUS * birth->l->radius, spacing = patch->job.spacing;
     size_t k = 0;
+    double energy = 0, mean_energy = 0;
+    float rho = mean_resemblance(birth);
     for (int q = 0; q < quads; ++q)
         for (int y = 0; y < side; ++y)
             for (int x = 0; x < side; ++x)
             {
                 size_t pixel = (size_t)y * RF_TILE_COLUMNS + (size_t)x;
-                float w2 = patch->sums.weight2[pixel], scale = w2 > 0 ? 1 / sqrtf(w2) : 0;
+                float w = patch->sums.weight[pixel], w2 = patch->sums.weight2[pixel];
+                float scale = w2 > 0 ? 1 / sqrtf(w2 + rho * rf_max(w * w - w2, 0)) : 0;
                 float dx = ((float)x + 0.5f - 0.5f * (float)side) * spacing,
                       dy = ((float)y + 0.5f - 0.5f * (float)side) * spacing;
                 float kernel = w2 > 0 ? fmaxf(1 - sqrtf(dx * dx + dy * dy) / reach, 0) : 0;
@@ -129,11 +167,14 @@ static RfResult window_create(const Birth *birth, const Patch *patch, int halvin
                 {
                     target[k] = colour[c] * scale;
                     weight[k] = kernel * (m->turned[q] ? 0 : m->match_weight[4 * q + c]);
+                    energy += (double)(weight[k] * target[k] * target[k]);
+                    mean_energy += (double)(weight[k] * m->variance[halvings + 1][4 * q + c]);
                 }
             }
     float margin = 0.5f * GRID_SIDE * birth->l->radius - 0.5f * (float)side * spacing;
-    *out = (RfMatchWindow){&m->texture, halvings + 1, side, side, rf_max_int((int)ceilf(margin / spacing), 0),
-                           target,      weight};
+    *out = (RfMatchWindow){
+        &m->texture,   halvings + 1,      side, side, rf_max_int((int)ceilf(margin / spacing), 0), target, weight,
+        (float)energy, (float)mean_energy};
     return RF_OK;
 }
 
@@ -225,14 +266,6 @@ static RfVec2 random_offset(const Birth *birth)
     float room_x = texture->tiles ? (float)texture->width : fmaxf((float)texture->width - side, 0);
     float room_y = texture->tiles ? (float)texture->height : fmaxf((float)texture->height - side, 0);
     return (RfVec2){r[0] * room_x - (birth->centre.x - 0.5f * side), r[1] * room_y - (birth->centre.y - 0.5f * side)};
-}
-
-static int coarsest_halvings(const RfLagrangian *l)
-{
-    int halvings = 0;
-    while ((float)(WINDOW_PIXELS << halvings) < 2 * l->radius && halvings + 2 < l->material.texture.level_count)
-        ++halvings;
-    return halvings;
 }
 
 // Exemplar minus frame coordinates of the new grid.
@@ -360,7 +393,7 @@ static RfResult dress(Birth *birth, const StepFlow *flow, RfArena *arena)
     Grid *grid = &l->grids[birth->index];
     birth->centre = grid->centre;
     find_overlaps(birth);
-    int halvings = coarsest_halvings(l);
+    int halvings = l->match_halvings;
     Patch patch;
     RfVec2 offset;
     RF_TRY(patch_create(l, birth->centre, halvings, l->radius, arena, &patch));
