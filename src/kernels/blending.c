@@ -39,6 +39,9 @@ typedef float Vec8 __attribute__((vector_size(32), aligned(4), may_alias));
 // A footprint is left to one sample up to this compression: the top of the band is mostly empty.
 #define FREE_COMPRESSION 1.5f
 
+// A row's ends are not drawn where others outweigh the grid by this: half a grey level at the most.
+#define NEGLIGIBLE (1.0f / 256)
+
 enum
 {
     MAX_TAPS = 4,
@@ -46,7 +49,7 @@ enum
     TILE_PIXELS = RF_TILE_ROWS * RF_TILE_COLUMNS
 };
 
-RfResult rf_tile_create(int quads, RfArena *arena, RfTileSums *out)
+RfResult rf_tile_create(int quads, int rows, RfArena *arena, RfTileSums *out)
 {
     out->colour = rf_arena_push(arena, (size_t)quads * TILE_PIXELS * 4, sizeof(float));
     out->weight = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
@@ -55,23 +58,26 @@ RfResult rf_tile_create(int quads, RfArena *arena, RfTileSums *out)
     out->planes = rf_arena_push(arena, 1, sizeof *out->planes);
     if (!out->colour || !out->weight || !out->weight2 || !out->level || !out->planes)
         return RF_OUT_OF_MEMORY;
-    memset(out->planes->weight, 0, sizeof out->planes->weight);
-    rf_tile_clear(out, quads);
+    memset(out->planes->weight, 0, (size_t)rows * RF_TILE_PITCH * sizeof(float));
+    rf_tile_clear(out, quads, rows);
     return RF_OK;
 }
 
-void rf_tile_clear(RfTileSums *sums, int quads)
+void rf_tile_clear(RfTileSums *sums, int quads, int rows)
 {
-    memset(sums->colour, 0, (size_t)quads * TILE_PIXELS * 4 * sizeof(float));
-    memset(sums->weight, 0, TILE_PIXELS * sizeof(float));
-    memset(sums->weight2, 0, TILE_PIXELS * sizeof(float));
-    memset(sums->level, 0, TILE_PIXELS * sizeof(float));
+    size_t pixels = (size_t)rows * RF_TILE_COLUMNS;
+    for (int q = 0; q < quads; ++q)
+        memset(sums->colour + (size_t)q * TILE_PIXELS * 4, 0, pixels * 4 * sizeof(float));
+    memset(sums->weight, 0, pixels * sizeof(float));
+    memset(sums->weight2, 0, pixels * sizeof(float));
+    memset(sums->level, 0, pixels * sizeof(float));
 }
 
 // Columns of each row that a grid has written to.
 typedef struct Extent
 {
-    int first[RF_TILE_ROWS], end[RF_TILE_ROWS];
+    // Padded, so that whole vectors of rows can be updated.
+    int first[RF_TILE_ROWS + WIDE], end[RF_TILE_ROWS + WIDE];
 } Extent;
 
 typedef struct Filter
@@ -172,6 +178,36 @@ RF_WIDE_BODY float slope_of(const Corner *p, const Corner *q)
     return q->y > p->y ? (q->x - p->x) / (q->y - p->y) : 0;
 }
 
+// Pixels of a triangle's rows: [first, end), end <= first where there are none.
+typedef struct TriangleRows
+{
+    int first[RF_TILE_ROWS + WIDE], end[RF_TILE_ROWS + WIDE];
+} TriangleRows;
+
+// All rows of the triangle a, b, c (from top to bottom) at once.
+RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner *b, const Corner *c, int first_row,
+                            int end_row, Extent *extent, TriangleRows *rows)
+{
+    float slope_ac = slope_of(a, c), slope_ab = slope_of(a, b), slope_bc = slope_of(b, c);
+    float ax = a->x, ay = a->y, bx = b->x, by = b->y, x0 = region->x0, x1 = region->x1;
+    int count = end_row - first_row;
+    int *restrict least = extent->first + first_row, *restrict most = extent->end + first_row;
+    for (int block = 0; block < count; block += WIDE)
+#pragma omp simd
+        for (int k = block; k < block + WIDE; ++k)
+        {
+            float y = (float)(first_row + k) + 0.5f, along = ax + (y - ay) * slope_ac;
+            float upper = ax + (y - ay) * slope_ab, lower = bx + (y - by) * slope_bc, other = y < by ? upper : lower;
+            float left = rf_max(rf_min(along, other), x0), right = rf_min(rf_max(along, other), x1);
+            int first = (int)ceilf(left - 0.5f), end = (int)ceilf(right - 0.5f);
+            bool some = k < count && end > first;
+            rows->first[k] = first;
+            rows->end[k] = end;
+            least[k] = some && first < least[k] ? first : least[k];
+            most[k] = some && end > most[k] ? end : most[k];
+        }
+}
+
 RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, const Corner *q, const Corner *r,
                                      RfTilePlanes *planes, Extent *extent)
 {
@@ -190,20 +226,16 @@ RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, cons
     Vec4 ab = b->value - a->value, ac = c->value - a->value;
     Vec4 dx = (ab * acy - ac * aby) * inverse, dy = (ac * abx - ab * acx) * inverse;
     Vec4 start = a->value + (0.5f - a->x) * dx + (0.5f - a->y) * dy;
-    float slope_ac = slope_of(a, c), slope_ab = slope_of(a, b), slope_bc = slope_of(b, c);
     int first_row = (int)ceilf(rf_max(a->y, region->y0) - 0.5f), end_row = (int)ceilf(rf_min(c->y, region->y1) - 0.5f);
+    TriangleRows rows;
+    find_rows(region, a, b, c, first_row, end_row, extent, &rows);
     for (int y = first_row; y < end_row; ++y)
     {
-        float yc = (float)y + 0.5f, along = a->x + (yc - a->y) * slope_ac;
-        float other = yc < b->y ? a->x + (yc - a->y) * slope_ab : b->x + (yc - b->y) * slope_bc;
-        int first = (int)ceilf(rf_max(rf_min(along, other), region->x0) - 0.5f);
-        int end = (int)ceilf(rf_min(rf_max(along, other), region->x1) - 0.5f);
-        if (end <= first)
+        int first = rows.first[y - first_row], count = rows.end[y - first_row] - first;
+        if (count <= 0)
             continue;
         Vec4 base = start + (float)first * dx + (float)y * dy;
-        write_pixels(planes, y * RF_TILE_PITCH + first, end - first, base, dx);
-        extent->first[y] = rf_min_int(extent->first[y], first);
-        extent->end[y] = rf_max_int(extent->end[y], end);
+        write_pixels(planes, y * RF_TILE_PITCH + first, count, base, dx);
     }
 }
 
@@ -289,7 +321,9 @@ RF_WIDE_BODY void weigh_row_with(const RfDrawJob *job, const RfDrawGrid *grid, f
         }
 }
 
-RF_WIDE_BODY void weigh_row(const RfDrawJob *job, const RfDrawGrid *grid, float *plane, int y, Row *row)
+// `others`: summed weights of the grids drawn before, or NULL.
+RF_WIDE_BODY void weigh_row(const RfDrawJob *job, const RfDrawGrid *grid, float *plane, const float *others, int y,
+                            Row *row)
 {
     if (job->sharpness == 1)
         weigh_row_with(job, grid, plane, y, row, 1);
@@ -297,9 +331,9 @@ RF_WIDE_BODY void weigh_row(const RfDrawJob *job, const RfDrawGrid *grid, float 
         weigh_row_with(job, grid, plane, y, row, 2);
     else
         weigh_row_with(job, grid, plane, y, row, 0);
-    while (row->first < row->end && !(row->weight[row->first] > 0))
+    while (row->first < row->end && !(row->weight[row->first] > (others ? NEGLIGIBLE * others[row->first] : 0)))
         ++row->first;
-    while (row->first < row->end && !(row->weight[row->end - 1] > 0))
+    while (row->first < row->end && !(row->weight[row->end - 1] > (others ? NEGLIGIBLE * others[row->end - 1] : 0)))
         --row->end;
 }
 
@@ -448,7 +482,7 @@ RF_WIDE_BODY void rf_tile_draw_body(const RfDrawJob *job, const RfDrawGrid *grid
         row.end = extent.end[y];
         if (row.first >= row.end)
             continue;
-        weigh_row(job, grid, sums->planes->weight + y * RF_TILE_PITCH, y, &row);
+        weigh_row(job, grid, sums->planes->weight + y * RF_TILE_PITCH, sums->weight + y * RF_TILE_COLUMNS, y, &row);
         if (row.first >= row.end)
             continue;
         sum_row(job, grid, &filter, y, &row, sums);
@@ -497,7 +531,7 @@ RF_WIDE_BODY void rf_tile_layers_body(const RfDrawJob *job, const RfDrawGrid *gr
         row.end = extent.end[y];
         if (row.first >= row.end)
             continue;
-        weigh_row(job, grid, planes->weight + y * RF_TILE_PITCH, y, &row);
+        weigh_row(job, grid, planes->weight + y * RF_TILE_PITCH, NULL, y, &row);
         for (int x = row.first; x < row.end; ++x)
             insert_layer(&layers[y * RF_TILE_COLUMNS + x], planes->u[y * RF_TILE_PITCH + x],
                          planes->v[y * RF_TILE_PITCH + x], row.weight[x], grid->id);

@@ -80,9 +80,9 @@ typedef struct RfTileSums
     RfTilePlanes *planes;
 } RfTileSums;
 
-/// Memory for the sums of one tile, cleared.
-RfResult rf_tile_create(int quads, RfArena *arena, RfTileSums *out);
-void rf_tile_clear(RfTileSums *sums, int quads);
+/// Memory for the sums of one tile, of which the first `rows` rows are cleared and may be drawn.
+RfResult rf_tile_create(int quads, int rows, RfArena *arena, RfTileSums *out);
+void rf_tile_clear(RfTileSums *sums, int quads, int rows);
 
 /// Adds one grid. lattice (NULL: not wanted): [RF_LATTICE_POINTS], cleared here, w of this grid at the lattice. Returns
 /// nothing; pixels_drawn grows by the samples taken.

@@ -136,7 +136,7 @@ static RfResult scratch_create(RfLagrangian *l, int worker, Scratch *out)
 {
     RfArena *arena = &l->workers[worker];
     size_t lanes = (size_t)l->material.lane_count;
-    RF_TRY(rf_tile_create(l->material.texture.quads, arena, &out->sums));
+    RF_TRY(rf_tile_create(l->material.texture.quads, RF_TILE_ROWS, arena, &out->sums));
     out->lattice = rf_arena_push(arena, (size_t)MAX_CORRELATED * RF_LATTICE_POINTS, sizeof(float));
     out->values = rf_arena_push(arena, lanes * RF_TILE_WIDTH, sizeof(float));
     out->place = rf_arena_push(arena, (size_t)l->count, sizeof(int));
@@ -332,7 +332,7 @@ static void draw_tile(void *context, int tile, int worker)
     memcpy(draw.turned, l->material.turned, sizeof draw.turned);
     const int *order = job->order + job->first[tile];
     int count = job->first[tile + 1] - job->first[tile], correlated = rf_min_int(count, MAX_CORRELATED);
-    rf_tile_clear(&scratch->sums, l->material.texture.quads);
+    rf_tile_clear(&scratch->sums, l->material.texture.quads, RF_TILE_ROWS);
     int64_t samples = 0, holes = 0;
     for (int i = 0; i < count; ++i)
     {

@@ -33,7 +33,7 @@ enum
 {
     // Pixels across a window at the coarsest spacing.
     WINDOW_PIXELS = 40,
-    KEEP = 6,
+    KEEP = 4,
     MAX_OVERLAPS = 96
 };
 
@@ -80,7 +80,7 @@ static RfResult patch_create(const RfLagrangian *l, RfVec2 centre, int halvings,
                            .height = side,
                            .level_bias = halvings + 1};
     memcpy(out->job.turned, m->turned, sizeof m->turned);
-    return rf_tile_create(m->texture.quads, arena, &out->sums);
+    return rf_tile_create(m->texture.quads, side, arena, &out->sums);
 }
 
 static void find_overlaps(Birth *birth)
@@ -352,7 +352,7 @@ static RfResult measure_resemblances(Birth *birth, int halvings, RfArena *arena)
         RfDrawGrid old = draw_grid_of(l, birth->overlaps[i], l->time);
         if (!(old.fade > 0))
             continue;
-        rf_tile_clear(&other.sums, l->material.texture.quads);
+        rf_tile_clear(&other.sums, l->material.texture.quads, other.job.height);
         rf_tile_draw(&other.job, &old, &other.sums, NULL, &pixels);
         float rho = correlation(&l->material, &mine, &other);
         if (fabsf(rho) > LEAST_RESEMBLANCE)

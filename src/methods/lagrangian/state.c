@@ -20,7 +20,7 @@ typedef struct Header
 {
     char magic[8];
     uint32_t version, header_size, grid_size, simd;
-    /// Of everything behind the header.
+    /// Of the header, with this as 0, and of everything behind it.
     uint64_t content_hash;
     uint64_t exemplar_hash, options_hash;
     int32_t width, height, count, started;
@@ -41,6 +41,12 @@ static uint64_t hash_options(const RfLagrangianOptions *options)
         hash = rf_hash_bytes((const uint8_t *)options + table[i].offset, size, hash);
     }
     return hash;
+}
+
+static uint64_t hash_content(Header header, const uint8_t *content, size_t size)
+{
+    header.content_hash = 0;
+    return rf_hash_bytes(content, size, rf_hash_bytes(&header, sizeof header, VERSION));
 }
 
 static size_t vertex_bytes(const RfLagrangian *l)
@@ -68,7 +74,6 @@ RfResult rf_lagrangian_save(const RfLagrangian *l, void **block, size_t *size)
                      .header_size = sizeof(Header),
                      .grid_size = sizeof(Grid),
                      .simd = (uint32_t)rf_simd_level(),
-                     .content_hash = rf_hash_bytes(bytes + sizeof(Header), total - sizeof(Header), VERSION),
                      .exemplar_hash = l->exemplar->hash,
                      .options_hash = hash_options(&l->options),
                      .width = l->width,
@@ -79,6 +84,7 @@ RfResult rf_lagrangian_save(const RfLagrangian *l, void **block, size_t *size)
                      .step = l->step,
                      .next_id = l->next_id};
     memcpy(header.magic, magic, sizeof magic);
+    header.content_hash = hash_content(header, bytes + sizeof header, total - sizeof header);
     memcpy(bytes, &header, sizeof header);
     *block = bytes;
     *size = total;
@@ -101,7 +107,7 @@ static RfResult check_header(const Header *header, const RfLagrangian *l, const 
                      header->height <= RF_MAX_SIZE && isfinite(header->time) &&
                      size == sizeof(Header) + (size_t)header->count * (sizeof(Grid) + 3 * vertices);
     if (!sizes_fit ||
-        header->content_hash != rf_hash_bytes((const uint8_t *)block + sizeof(Header), size - sizeof(Header), VERSION))
+        header->content_hash != hash_content(*header, (const uint8_t *)block + sizeof(Header), size - sizeof(Header)))
         return rf_fail(RF_BAD_INPUT, NULL, "content", "the saved state is damaged: start again without it");
     return RF_OK;
 }
