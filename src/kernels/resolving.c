@@ -47,3 +47,36 @@ RF_WIDE(rf_resolve_row,
         (const float *colour, const float *inverse_sum, const float *inverse_norm, const RfResolveQuad *quad, int count,
          float *values),
         (colour, inverse_sum, inverse_norm, quad, count, values))
+
+typedef float Vec4 __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int32_t Mask4 __attribute__((vector_size(16), may_alias));
+
+RF_WIDE_BODY Vec4 select4(Mask4 mask, Vec4 yes, Vec4 no)
+{
+    return (Vec4)((mask & (Mask4)yes) | (~mask & (Mask4)no));
+}
+
+RF_WIDE_BODY void rf_resolve_rgb_body(const float *restrict colour, const float *restrict inverse_sum,
+                                      const float *restrict inverse_norm, const RfResolveQuad *quad, int count,
+                                      float *restrict values)
+{
+    Vec4 mean = *(const Vec4 *)quad->mean, low = *(const Vec4 *)quad->low, high = *(const Vec4 *)quad->high;
+    Vec4 plain = *(const Vec4 *)quad->plain;
+    for (int k = 0; k < count; ++k)
+    {
+        Vec4 value =
+            mean + *(const Vec4 *)(colour + 4 * k) * (inverse_norm[k] + plain * (inverse_sum[k] - inverse_norm[k]));
+        value = select4(value > low, value, low);
+        value = select4(value < high, value, high);
+        if (k + 1 < count)
+            *(Vec4 *)(values + 3 * k) = value; // The fourth number is the next pixel's first, written after this.
+        else
+            for (int c = 0; c < 3; ++c)
+                values[3 * k + c] = value[c];
+    }
+}
+
+RF_WIDE(rf_resolve_rgb,
+        (const float *colour, const float *inverse_sum, const float *inverse_norm, const RfResolveQuad *quad, int count,
+         float *values),
+        (colour, inverse_sum, inverse_norm, quad, count, values))

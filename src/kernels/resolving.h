@@ -21,3 +21,7 @@ void rf_resolve_row(const float *colour, const float *inverse_sum, const float *
 /// [count], the mean correlation of the grids that overlap there.
 void rf_resolve_scales(const float *weight, const float *weight2, const float *rho, int count, float *inverse_sum,
                        float *inverse_norm);
+
+/// rf_resolve_row for the first three lanes, packed: values[count][3].
+void rf_resolve_rgb(const float *colour, const float *inverse_sum, const float *inverse_norm, const RfResolveQuad *quad,
+                    int count, float *values);

@@ -273,17 +273,12 @@ static bool is_simple(const RfLagrangian *l)
            !l->material.turned[0];
 }
 
-static void write_simple_row(const float *restrict weight, const float *restrict values, int width, float *restrict out,
-                             int64_t *holes)
+static int count_missing(const float *weight, int width)
 {
     int missing = 0;
     for (int x = 0; x < width; ++x)
-    {
         missing += !(weight[x] > 0);
-        for (int c = 0; c < 3; ++c)
-            out[3 * x + c] = values[4 * x + c];
-    }
-    *holes += missing;
+    return missing;
 }
 
 static void resolve_row(const FrameJob *job, Scratch *scratch, const float *rho, int x0, int y, int row, int width,
@@ -295,15 +290,16 @@ static void resolve_row(const FrameJob *job, Scratch *scratch, const float *rho,
     size_t place = (size_t)row * RF_TILE_COLUMNS;
     const float *weight = scratch->sums.weight + place;
     rf_resolve_scales(weight, scratch->sums.weight2 + place, rho, width, inverse_sum, inverse_norm);
-    for (int q = 0; q < l->material.texture.quads; ++q)
-        rf_resolve_row(scratch->sums.colour + ((size_t)q * TILE_PIXELS + place) * 4, inverse_sum, inverse_norm,
-                       &job->quads[q], width, scratch->values + (size_t)q * RF_TILE_WIDTH * 4);
     float *out = job->frame.pixels + y * job->frame.row_stride + (ptrdiff_t)x0 * channels;
     if (is_simple(l) && !job->flow->view->mask)
     {
-        write_simple_row(weight, scratch->values, width, out, holes);
+        rf_resolve_rgb(scratch->sums.colour + place * 4, inverse_sum, inverse_norm, &job->quads[0], width, out);
+        *holes += count_missing(weight, width);
         return;
     }
+    for (int q = 0; q < l->material.texture.quads; ++q)
+        rf_resolve_row(scratch->sums.colour + ((size_t)q * TILE_PIXELS + place) * 4, inverse_sum, inverse_norm,
+                       &job->quads[q], width, scratch->values + (size_t)q * RF_TILE_WIDTH * 4);
     for (int x = 0; x < width; ++x, out += channels)
     {
         if (!pixel_in_fluid(job->flow, x0 + x, y))

@@ -33,7 +33,7 @@ enum
 {
     // Pixels across a window at the coarsest spacing.
     WINDOW_PIXELS = 40,
-    KEEP = 4,
+    KEEP = 2,
     MAX_OVERLAPS = 96
 };
 
