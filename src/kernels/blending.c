@@ -99,14 +99,21 @@ typedef struct Row
 typedef struct Region
 {
     float x0, y0, x1, y1;
+    // The circle itself.
+    float cx, cy, radius;
 } Region;
 
 RF_WIDE_BODY Region region_of(const RfDrawJob *job, const RfDrawGrid *grid)
 {
     float inverse = 1 / job->spacing, radius = grid->radius * inverse;
     float cx = (grid->centre.x - job->origin.x) * inverse, cy = (grid->centre.y - job->origin.y) * inverse;
-    return (Region){rf_max(cx - radius, 0), rf_max(cy - radius, 0), rf_min(cx + radius, (float)job->width),
-                    rf_min(cy + radius, (float)job->height)};
+    return (Region){rf_max(cx - radius, 0),
+                    rf_max(cy - radius, 0),
+                    rf_min(cx + radius, (float)job->width),
+                    rf_min(cy + radius, (float)job->height),
+                    cx,
+                    cy,
+                    radius};
 }
 
 // ---- rasterising
@@ -190,6 +197,7 @@ RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner 
 {
     float slope_ac = slope_of(a, c), slope_ab = slope_of(a, b), slope_bc = slope_of(b, c);
     float ax = a->x, ay = a->y, bx = b->x, by = b->y, x0 = region->x0, x1 = region->x1;
+    float cx = region->cx, cy = region->cy, radius2 = region->radius * region->radius;
     int count = end_row - first_row;
     int *restrict least = extent->first + first_row, *restrict most = extent->end + first_row;
     for (int block = 0; block < count; block += WIDE)
@@ -198,7 +206,9 @@ RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner 
         {
             float y = (float)(first_row + k) + 0.5f, along = ax + (y - ay) * slope_ac;
             float upper = ax + (y - ay) * slope_ab, lower = bx + (y - by) * slope_bc, other = y < by ? upper : lower;
-            float left = rf_max(rf_min(along, other), x0), right = rf_min(rf_max(along, other), x1);
+            float chord = sqrtf(rf_max(radius2 - (y - cy) * (y - cy), 0));
+            float left = rf_max(rf_min(along, other), rf_max(x0, cx - chord));
+            float right = rf_min(rf_max(along, other), rf_min(x1, cx + chord));
             int first = (int)ceilf(left - 0.5f), end = (int)ceilf(right - 0.5f);
             bool some = k < count && end > first;
             rows->first[k] = first;

@@ -81,7 +81,7 @@ typedef struct FrameJob
     RfImageView frame;
     RfDrawGrid *grids;
     int columns, rows;
-    // Grids of tile t: order[first[t]] ... order[first[t + 1] - 1], in order of birth.
+    // Grids of tile t: order[first[t]] ... order[first[t + 1] - 1], the live ones first, each kind in order of birth.
     int *first, *order;
     Scratch scratch[RF_MAX_THREADS];
     int64_t *holes, *samples;
@@ -124,11 +124,13 @@ static RfResult bin_grids(RfLagrangian *l, FrameJob *job)
     if (!job->order || !next)
         return RF_OUT_OF_MEMORY;
     memcpy(next, job->first, (size_t)tiles * sizeof *next);
-    for (int g = 0; g < l->count; ++g)
-        if (visible_tiles(job, &job->grids[g], range))
-            for (int y = range[2]; y <= range[3]; ++y)
-                for (int x = range[0]; x <= range[1]; ++x)
-                    job->order[next[y * job->columns + x]++] = g;
+    // Live grids first: what they outweigh of the fading ones need not be drawn.
+    for (int fading = 0; fading < 2; ++fading)
+        for (int g = 0; g < l->count; ++g)
+            if (l->grids[g].retired == (fading == 1) && visible_tiles(job, &job->grids[g], range))
+                for (int y = range[2]; y <= range[3]; ++y)
+                    for (int x = range[0]; x <= range[1]; ++x)
+                        job->order[next[y * job->columns + x]++] = g;
     return RF_OK;
 }
 
