@@ -186,7 +186,7 @@ static void check_drawing(float bend, float sharpness, bool tiles, float spacing
     job.origin = (RfVec2){-3, 10};
     job.width = RF_TILE_COLUMNS - 5;
     job.height = RF_TILE_ROWS - 9;
-    assert_int_equal(rf_tile_create(QUADS, &arena, &sums), RF_OK);
+    assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums), RF_OK);
     memset(&g_slow, 0, sizeof g_slow);
     // One in the middle, one across two borders of the tile, one in a corner, one out of sight.
     static const RfVec2 centres[] = {{61.3f, 40.7f}, {120, 66}, {-4, 13}, {1e6f, 40}};
@@ -238,7 +238,7 @@ static void vertices_on_pixel_centres_leave_no_hole(void **state)
     RfTileSums sums;
     RfTexture texture = make_texture(true);
     RfDrawJob job = make_job(&texture, 1);
-    assert_int_equal(rf_tile_create(QUADS, &arena, &sums), RF_OK);
+    assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums), RF_OK);
     TestGrid g;
     make_grid(&g, (RfVec2){60, 32}, 22, 0, 1);
     // Every edge runs through pixel centres.
@@ -322,7 +322,7 @@ static void the_lattice_holds_this_grids_weights_and_zero_elsewhere(void **state
     RfTileSums sums;
     RfTexture texture = make_texture(true);
     RfDrawJob job = make_job(&texture, 1);
-    assert_int_equal(rf_tile_create(QUADS, &arena, &sums), RF_OK);
+    assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums), RF_OK);
     TestGrid g[2];
     float lattice[RF_LATTICE_POINTS];
     int64_t samples = 0;
@@ -355,7 +355,7 @@ static void direction_maps_turn_with_the_grid(void **state)
     job.turned[1] = 2;
     RfArena arena = {0};
     RfTileSums sums;
-    assert_int_equal(rf_tile_create(QUADS, &arena, &sums), RF_OK);
+    assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums), RF_OK);
     TestGrid g;
     make_grid(&g, (RfVec2){60, 32}, 22, 0, 1);
     // 30 degrees clockwise on the screen.
@@ -382,8 +382,8 @@ static void folded_and_degenerate_grids_give_finite_sums_and_leave_nothing_behin
     RfArena arena = {0};
     RfTileSums sums, sound;
     RfTexture texture = make_texture(true);
-    assert_int_equal(rf_tile_create(QUADS, &arena, &sums), RF_OK);
-    assert_int_equal(rf_tile_create(QUADS, &arena, &sound), RF_OK);
+    assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums), RF_OK);
+    assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sound), RF_OK);
     enum
     {
         CASES = 10
@@ -419,7 +419,7 @@ static void folded_and_degenerate_grids_give_finite_sums_and_leave_nothing_behin
             memset(g.draw.stretch, 0, sizeof g.draw.stretch);
         if (c == 3)
             g.draw.stretch[0] = g.draw.stretch[3] = 1e-12f;
-        rf_tile_clear(&sums, QUADS);
+        rf_tile_clear(&sums, QUADS, RF_TILE_ROWS);
         rf_tile_draw(&job, &g.draw, &sums, NULL, &samples);
         for (int p = 0; p < PIXELS; ++p)
         {
@@ -429,8 +429,8 @@ static void folded_and_degenerate_grids_give_finite_sums_and_leave_nothing_behin
                     isfinite(sums.colour[(size_t)p * 4 + (size_t)(lane % 4) + (size_t)(lane / 4) * PIXELS * 4]));
             assert_true(sums.weight[p] <= 1);
         }
-        rf_tile_clear(&sums, QUADS);
-        rf_tile_clear(&sound, QUADS);
+        rf_tile_clear(&sums, QUADS, RF_TILE_ROWS);
+        rf_tile_clear(&sound, QUADS, RF_TILE_ROWS);
         make_grid(&g, (RfVec2){64, 30}, 20, 0.1f, 2);
         rf_tile_draw(&job, &g.draw, &sums, NULL, &samples);
         rf_tile_draw(&job, &g.draw, &sound, NULL, &samples);
@@ -448,7 +448,7 @@ static void a_squeezed_grid_is_averaged_not_aliased(void **state)
     RfTileSums sums;
     RfTexture texture = make_texture(true);
     RfDrawJob job = make_job(&texture, 1);
-    assert_int_equal(rf_tile_create(QUADS, &arena, &sums), RF_OK);
+    assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums), RF_OK);
     // White noise; the picture of n by n pixels a pixel has a deviation of 1 / n; of n along one axis, 1 / sqrt(n).
     static const float squeeze[][2] = {{4, 1}, {1, 3}, {4, 4}};
     static const double greatest[] = {0.68, 0.75, 0.4};
@@ -465,7 +465,7 @@ static void a_squeezed_grid_is_averaged_not_aliased(void **state)
         }
         g.draw.stretch[0] = 1 / squeeze[c][0];
         g.draw.stretch[3] = 1 / squeeze[c][1];
-        rf_tile_clear(&sums, QUADS);
+        rf_tile_clear(&sums, QUADS, RF_TILE_ROWS);
         rf_tile_draw(&job, &g.draw, &sums, NULL, &samples);
         double squares = 0, n = 0;
         for (int p = 0; p < PIXELS; ++p)
@@ -489,14 +489,14 @@ static int dump(const char *path)
     RfTileSums sums;
     RfTexture texture = make_texture(true);
     FILE *file = fopen(path, "wb");
-    if (!file || rf_tile_create(QUADS, &arena, &sums) != RF_OK)
+    if (!file || rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums) != RF_OK)
         return 1;
     for (int turn = 0; turn < 3; ++turn)
     {
         RfDrawJob job = make_job(&texture, turn == 0 ? 1.0f : turn == 1 ? 2.0f : 3.3f);
         job.turned[1] = turn;
         int64_t samples = 0;
-        rf_tile_clear(&sums, QUADS);
+        rf_tile_clear(&sums, QUADS, RF_TILE_ROWS);
         for (uint64_t i = 0; i < 12; ++i)
         {
             TestGrid g;

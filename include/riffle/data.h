@@ -62,8 +62,8 @@ RF_API void rf_image_set_channel_name(RfImage *image, int channel, const char *n
 RF_API const char *rf_image_channel_name(const RfImage *image, int channel);
 /// True if the last channel is alpha: named "A", or the 2nd or 4th channel of an image with standard names.
 RF_API bool rf_image_has_alpha(const RfImage *image);
-/// Converts the colour channels in place between sRGB-encoded and linear, alpha untouched; RF_ENCODING_DATA is never
-/// converted.
+/// Converts the colour channels (named R, G, B or Y) in place between sRGB-encoded and linear. Alpha and all others are
+/// data and stay; so does an image of RF_ENCODING_DATA.
 RF_API void rf_image_convert(RfImage *image, RfEncoding encoding);
 
 /// One map of a material.

@@ -104,18 +104,23 @@ bool rf_image_has_alpha(const RfImage *image)
     return image->view.channels > 1 && strcmp(image->names[image->view.channels - 1], "A") == 0;
 }
 
+// Colour channels are R, G, B and Y; alpha and everything else is data.
+static bool is_colour(const char *name)
+{
+    return (name[0] == 'R' || name[0] == 'G' || name[0] == 'B' || name[0] == 'Y') && name[1] == '\0';
+}
+
 void rf_image_convert(RfImage *image, RfEncoding encoding)
 {
     if (image->encoding == encoding || image->encoding == RF_ENCODING_DATA || encoding == RF_ENCODING_DATA)
         return;
-    bool alpha = rf_image_has_alpha(image);
-    int colours = image->view.channels - (alpha ? 1 : 0);
+    int channels = image->view.channels;
     size_t pixels = (size_t)image->view.width * (size_t)image->view.height;
-    for (size_t i = 0; i < pixels; ++i)
+    for (int c = 0; c < channels; ++c)
     {
-        float *pixel = image->view.pixels + i * (size_t)image->view.channels;
-        for (int c = 0; c < colours; ++c)
-            pixel[c] = encoding == RF_ENCODING_LINEAR ? rf_srgb_to_linear(pixel[c]) : rf_linear_to_srgb(pixel[c]);
+        float *value = image->view.pixels + c;
+        for (size_t i = 0; i < pixels && is_colour(image->names[c]); ++i, value += channels)
+            *value = encoding == RF_ENCODING_LINEAR ? rf_srgb_to_linear(*value) : rf_linear_to_srgb(*value);
     }
     image->encoding = encoding;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An output file that appears whole or not at all: written as .NAME.PID.tmp in the same folder, flushed to the disk,
+// An output file that appears whole or not at all: written as .tmpPID.NAME in the same folder, flushed to the disk,
 // renamed.
 #pragma once
 

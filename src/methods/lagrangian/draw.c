@@ -29,7 +29,7 @@ enum
 // Pictures that contradict each other are not pulled further apart than this.
 #define LEAST_RHO -0.3f
 
-RfDrawGrid draw_grid_of(const RfLagrangian *l, int index, double time)
+RfDrawGrid rf_lagrangian_draw_grid_of(const RfLagrangian *l, int index, double time)
 {
     const Grid *grid = &l->grids[index];
     int n = l->options.grid_vertices;
@@ -43,7 +43,7 @@ RfDrawGrid draw_grid_of(const RfLagrangian *l, int index, double time)
                        .cell = l->cell,
                        .centre = grid->centre,
                        .radius = KERNEL_RADIUS * l->radius,
-                       .fade = grid_fade(grid, time),
+                       .fade = rf_lagrangian_grid_fade(grid, time),
                        .turn_cos = grid->turn_cos,
                        .turn_sin = grid->turn_sin,
                        .stretch = {grid->stretch[0], grid->stretch[1], grid->stretch[2], grid->stretch[3]},
@@ -110,7 +110,7 @@ static RfResult bin_grids(RfLagrangian *l, FrameJob *job)
     memset(job->first, 0, ((size_t)tiles + 1) * sizeof *job->first);
     for (int g = 0; g < l->count; ++g)
     {
-        job->grids[g] = draw_grid_of(l, g, l->time);
+        job->grids[g] = rf_lagrangian_draw_grid_of(l, g, l->time);
         if (!visible_tiles(job, &job->grids[g], range))
             continue;
         for (int y = range[2]; y <= range[3]; ++y)
@@ -349,7 +349,7 @@ static void draw_tile(void *context, int tile, int worker)
     job->samples[tile] = samples;
 }
 
-RfResult frame_draw(RfLagrangian *l, const StepFlow *flow, const RfImageView *frame)
+RfResult rf_lagrangian_frame_draw(RfLagrangian *l, const StepFlow *flow, const RfImageView *frame)
 {
     FrameJob job = {.l = l,
                     .flow = flow,
@@ -418,7 +418,7 @@ static void layer_tile(void *context, int tile, int worker)
                       .height = rf_min_int(RF_TILE_HEIGHT, l->height - y0)};
     for (int g = 0; g < l->count; ++g)
     {
-        RfDrawGrid grid = draw_grid_of(l, g, l->time);
+        RfDrawGrid grid = rf_lagrangian_draw_grid_of(l, g, l->time);
         if (grid.fade > 0 && grid.x1 > (float)x0 && grid.y1 > (float)y0 && grid.x0 < (float)(x0 + draw.width) &&
             grid.y0 < (float)(y0 + draw.height))
             rf_tile_layers(&draw, &grid, &job->planes[worker], layers);

@@ -17,7 +17,7 @@
 // layers and smears more, 0.35 flickers.
 #define FADE_SHARE 0.6f
 
-RfResult grids_reserve(RfLagrangian *l, int capacity)
+RfResult rf_lagrangian_grids_reserve(RfLagrangian *l, int capacity)
 {
     if (capacity <= l->capacity)
         return RF_OK;
@@ -227,13 +227,13 @@ static void advect_one(void *context, int index, int worker)
     measure_grid(l, job->flow, index, inside);
 }
 
-void grids_advect(RfLagrangian *l, const StepFlow *flow)
+void rf_lagrangian_grids_advect(RfLagrangian *l, const StepFlow *flow)
 {
     AdvectJob job = {l, flow};
     rf_parallel_for(l->count, advect_one, &job);
 }
 
-void grids_measure_new(RfLagrangian *l, const StepFlow *flow, int index)
+void rf_lagrangian_grids_measure_new(RfLagrangian *l, const StepFlow *flow, int index)
 {
     StepFlow still = *flow;
     still.from = flow->view->time;
@@ -241,7 +241,7 @@ void grids_measure_new(RfLagrangian *l, const StepFlow *flow, int index)
     advect_one(&job, index, 0);
 }
 
-float fade_length(const RfLagrangian *l, float strain)
+float rf_lagrangian_fade_length(const RfLagrangian *l, float strain)
 {
     float longest = l->options.fade * l->options.fps, limit = l->options.max_distortion;
     // A grid is retired at delta = (1 + delta_max) / 2 and has no weight left at delta_max. Pure strain e takes
@@ -255,11 +255,11 @@ static void retire(RfLagrangian *l, int index, double time)
     Grid *grid = &l->grids[index];
     grid->retired = true;
     grid->retirement = time;
-    grid->fade_out = fade_length(l, grid->strain);
+    grid->fade_out = rf_lagrangian_fade_length(l, grid->strain);
     ++l->stats.retired;
 }
 
-float grid_fade(const Grid *grid, double time)
+float rf_lagrangian_grid_fade(const Grid *grid, double time)
 {
     float in = grid->fade_in > 0 ? rf_clamp((float)((time - grid->birth) / (double)grid->fade_in), 0, 1) : 1;
     if (!grid->retired)
@@ -296,7 +296,7 @@ static RfResult retire_close_pairs(RfLagrangian *l, double time)
     return RF_OK;
 }
 
-RfResult grids_retire(RfLagrangian *l, const StepFlow *flow)
+RfResult rf_lagrangian_grids_retire(RfLagrangian *l, const StepFlow *flow)
 {
     double time = flow->view->time;
     for (int i = 0; i < l->count; ++i)
@@ -308,10 +308,11 @@ RfResult grids_retire(RfLagrangian *l, const StepFlow *flow)
 // Out of sight for good: faded out, worn out altogether, or out of the fluid.
 static bool is_gone(const Grid *grid, double time)
 {
-    return grid->inside_count == 0 || (grid->retired && (grid->greatest_quality == 0 || grid_fade(grid, time) == 0));
+    return grid->inside_count == 0 ||
+           (grid->retired && (grid->greatest_quality == 0 || rf_lagrangian_grid_fade(grid, time) == 0));
 }
 
-void grids_drop(RfLagrangian *l)
+void rf_lagrangian_grids_drop(RfLagrangian *l)
 {
     size_t vertices = (size_t)(l->options.grid_vertices * l->options.grid_vertices);
     int kept = 0;

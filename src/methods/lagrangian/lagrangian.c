@@ -120,13 +120,13 @@ RfResult rf_lagrangian_create(const RfExemplar *exemplar, const RfLagrangianOpti
     l->options = *options;
     l->radius = radius;
     l->cell = GRID_SIDE * radius / (float)(options->grid_vertices - 1);
-    RfResult result = material_create(exemplar, options->blend, &l->material);
+    RfResult result = rf_lagrangian_material_create(exemplar, options->blend, &l->material);
     if (result != RF_OK)
     {
         rf_lagrangian_destroy(l);
         return result;
     }
-    l->match_halvings = coarsest_halvings(l);
+    l->match_halvings = rf_lagrangian_coarsest_halvings(l);
     *out = l;
     return RF_OK;
 }
@@ -135,7 +135,7 @@ void rf_lagrangian_destroy(RfLagrangian *l)
 {
     if (!l)
         return;
-    material_free(&l->material);
+    rf_lagrangian_material_free(&l->material);
     rf_release(l->grids);
     rf_release(l->x);
     rf_release(l->y);
@@ -186,11 +186,11 @@ static RfResult move_to(RfLagrangian *l, const RfFlowView *view, int width, int 
         rf_arena_reset(&l->workers[i]);
 
     double start = now();
-    grids_advect(l, flow);
+    rf_lagrangian_grids_advect(l, flow);
     double advected = now();
-    RF_TRY(grids_retire(l, flow));
-    grids_drop(l);
-    RF_TRY(grids_refill(l, flow));
+    RF_TRY(rf_lagrangian_grids_retire(l, flow));
+    rf_lagrangian_grids_drop(l);
+    RF_TRY(rf_lagrangian_grids_refill(l, flow));
     l->stats.advect_seconds = advected - start;
     l->stats.distribute_seconds = now() - advected;
     count_grids(l);
@@ -216,7 +216,7 @@ RfResult rf_lagrangian_step(RfLagrangian *l, const RfFlowView *flow, const RfIma
     StepFlow step;
     RF_TRY(move_to(l, flow, frame->width, frame->height, &step));
     double start = now();
-    RF_TRY(frame_draw(l, &step, frame));
+    RF_TRY(rf_lagrangian_frame_draw(l, &step, frame));
     l->stats.draw_seconds = now() - start;
     return RF_OK;
 }

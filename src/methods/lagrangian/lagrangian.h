@@ -93,8 +93,8 @@ struct RfLagrangian
     RfLagrangianStats stats;
 };
 
-RfResult material_create(const RfExemplar *exemplar, RfBlend blend, Material *out);
-void material_free(Material *material);
+RfResult rf_lagrangian_material_create(const RfExemplar *exemplar, RfBlend blend, Material *out);
+void rf_lagrangian_material_free(Material *material);
 
 /// What a step needs to know of the flow.
 typedef struct StepFlow
@@ -105,19 +105,19 @@ typedef struct StepFlow
 } StepFlow;
 
 /// grids.c
-RfResult grids_reserve(RfLagrangian *l, int capacity);
-void grids_advect(RfLagrangian *l, const StepFlow *flow);
-void grids_measure_new(RfLagrangian *l, const StepFlow *flow, int index);
-RfResult grids_retire(RfLagrangian *l, const StepFlow *flow);
-void grids_drop(RfLagrangian *l);
-float grid_fade(const Grid *grid, double time);
+RfResult rf_lagrangian_grids_reserve(RfLagrangian *l, int capacity);
+void rf_lagrangian_grids_advect(RfLagrangian *l, const StepFlow *flow);
+void rf_lagrangian_grids_measure_new(RfLagrangian *l, const StepFlow *flow, int index);
+RfResult rf_lagrangian_grids_retire(RfLagrangian *l, const StepFlow *flow);
+void rf_lagrangian_grids_drop(RfLagrangian *l);
+float rf_lagrangian_grid_fade(const Grid *grid, double time);
 /// Frames that a fade takes where the flow strains at this rate.
-float fade_length(const RfLagrangian *l, float strain);
+float rf_lagrangian_fade_length(const RfLagrangian *l, float strain);
 
 /// refill.c
-int coarsest_halvings(const RfLagrangian *l);
-RfResult grids_refill(RfLagrangian *l, const StepFlow *flow);
+int rf_lagrangian_coarsest_halvings(const RfLagrangian *l);
+RfResult rf_lagrangian_grids_refill(RfLagrangian *l, const StepFlow *flow);
 
 /// draw.c
-RfDrawGrid draw_grid_of(const RfLagrangian *l, int index, double time);
-RfResult frame_draw(RfLagrangian *l, const StepFlow *flow, const RfImageView *frame);
+RfDrawGrid rf_lagrangian_draw_grid_of(const RfLagrangian *l, int index, double time);
+RfResult rf_lagrangian_frame_draw(RfLagrangian *l, const StepFlow *flow, const RfImageView *frame);

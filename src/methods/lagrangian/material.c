@@ -102,7 +102,7 @@ static RfResult prepare_map(const RfExemplar *exemplar, int index, float *lanes,
     return RF_OK;
 }
 
-RfResult material_create(const RfExemplar *exemplar, RfBlend blend, Material *out)
+RfResult rf_lagrangian_material_create(const RfExemplar *exemplar, RfBlend blend, Material *out)
 {
     *out = (Material){.blend = blend};
     assign_lanes(exemplar, out);
@@ -120,7 +120,7 @@ RfResult material_create(const RfExemplar *exemplar, RfBlend blend, Material *ou
     rf_release(lanes);
     if (result != RF_OK)
     {
-        material_free(out);
+        rf_lagrangian_material_free(out);
         return result;
     }
     for (int level = 0; level < out->texture.level_count; ++level)
@@ -133,7 +133,7 @@ RfResult material_create(const RfExemplar *exemplar, RfBlend blend, Material *ou
     return RF_OK;
 }
 
-void material_free(Material *material)
+void rf_lagrangian_material_free(Material *material)
 {
     rf_texture_free(&material->texture);
     for (int i = 0; i < RF_MAX_MAPS; ++i)

@@ -58,7 +58,7 @@ typedef struct Birth
     int overlaps[MAX_OVERLAPS], overlap_count;
 } Birth;
 
-int coarsest_halvings(const RfLagrangian *l)
+int rf_lagrangian_coarsest_halvings(const RfLagrangian *l)
 {
     int halvings = 0;
     while ((float)(WINDOW_PIXELS << halvings) < 2 * l->radius && halvings + 2 < l->material.texture.level_count)
@@ -98,7 +98,7 @@ static void draw_overlaps(const Birth *birth, Patch *patch)
     int64_t pixels = 0;
     for (int i = 0; i < birth->overlap_count; ++i)
     {
-        RfDrawGrid grid = draw_grid_of(birth->l, birth->overlaps[i], birth->l->time);
+        RfDrawGrid grid = rf_lagrangian_draw_grid_of(birth->l, birth->overlaps[i], birth->l->time);
         rf_tile_draw(&patch->job, &grid, &patch->sums, NULL, &pixels);
     }
 }
@@ -130,7 +130,7 @@ static float mean_resemblance(const Birth *birth)
         {
             const Grid *a = &l->grids[birth->overlaps[i]], *b = &l->grids[birth->overlaps[j]];
             float near = rf_max(1 - rf_vec2_length(rf_vec2_sub(a->centre, b->centre)) / reach, 0);
-            float weight = near * near * grid_fade(a, l->time) * grid_fade(b, l->time);
+            float weight = near * near * rf_lagrangian_grid_fade(a, l->time) * rf_lagrangian_grid_fade(b, l->time);
             sum += weight * resemblance_of(l, birth->overlaps[i], birth->overlaps[j]);
             total += weight;
         }
@@ -344,12 +344,12 @@ static RfResult measure_resemblances(Birth *birth, int halvings, RfArena *arena)
     // Correlation is a matter of all frequencies, so the full texture is sampled, if at few places.
     mine.job.level_bias = other.job.level_bias = 0;
     mine.job.sharpness = other.job.sharpness = 1;
-    RfDrawGrid solo = draw_grid_of(l, birth->index, l->time);
+    RfDrawGrid solo = rf_lagrangian_draw_grid_of(l, birth->index, l->time);
     solo.fade = 1;
     rf_tile_draw(&mine.job, &solo, &mine.sums, NULL, &pixels);
     for (int i = 0; i < birth->overlap_count; ++i)
     {
-        RfDrawGrid old = draw_grid_of(l, birth->overlaps[i], l->time);
+        RfDrawGrid old = rf_lagrangian_draw_grid_of(l, birth->overlaps[i], l->time);
         if (!(old.fade > 0))
             continue;
         rf_tile_clear(&other.sums, l->material.texture.quads, other.job.height);
@@ -376,10 +376,10 @@ static void place_vertices(RfLagrangian *l, int index, RfVec2 centre)
 
 static RfResult give_birth(RfLagrangian *l, const StepFlow *flow, RfVec2 centre)
 {
-    RF_TRY(grids_reserve(l, l->count + 1));
+    RF_TRY(rf_lagrangian_grids_reserve(l, l->count + 1));
     l->grids[l->count] = (Grid){.id = l->next_id, .birth = l->time, .centre = centre};
     place_vertices(l, l->count, centre);
-    grids_measure_new(l, flow, l->count);
+    rf_lagrangian_grids_measure_new(l, flow, l->count);
     ++l->count;
     ++l->next_id;
     ++l->stats.born;
@@ -404,7 +404,7 @@ static RfResult dress(Birth *birth, const StepFlow *flow, RfArena *arena)
     grid->v0 = birth->centre.y - half + offset.y;
     if (l->started && weight_at_centre(birth, &patch) >= UNCOVERED)
     {
-        grid->fade_in = fade_length(l, grid->strain);
+        grid->fade_in = rf_lagrangian_fade_length(l, grid->strain);
         grid->birth = flow->from;
     }
     if (l->options.candidates > 1 && l->options.blend != RF_BLEND_PLAIN)
@@ -462,7 +462,7 @@ static bool fluid_point(const RfDiskField *field, int cell, const RfLagrangian *
     return false;
 }
 
-RfResult grids_refill(RfLagrangian *l, const StepFlow *flow)
+RfResult rf_lagrangian_grids_refill(RfLagrangian *l, const StepFlow *flow)
 {
     RfDiskField field;
     RF_TRY(rf_disk_field_create(l->width, l->height, l->radius, &l->arena, &field));

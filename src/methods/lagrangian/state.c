@@ -114,7 +114,7 @@ static RfResult check_header(const Header *header, const RfLagrangian *l, const 
 
 static RfResult restore(RfLagrangian *l, const Header *header, const void *block)
 {
-    RF_TRY(grids_reserve(l, header->count));
+    RF_TRY(rf_lagrangian_grids_reserve(l, header->count));
     l->width = header->width;
     l->height = header->height;
     l->count = header->count;
