@@ -162,10 +162,40 @@ static void a_constant_picture_comes_back_whatever_was_blended(void **state)
             float g[3] = {blended[k], -blended[k], 0.5f}, value[3];
             rf_histogram_invert(&h, 0, g, value);
             for (int c = 0; c < channels; ++c)
-                assert_true(fabsf(value[c] - 0.25f * (float)(1 + c)) < 1e-6f);
+                assert_true(value[c] == 0.25f * (float)(1 + c));
         }
         rf_histogram_free(&h);
     }
+}
+
+static void whatever_was_blended_maps_back_into_the_pictures_range(void **state)
+{
+    (void)state;
+    RfHistogram h;
+    make_pixels();
+    assert_int_equal(rf_histogram_create(g_pixels, COUNT, STRIDE, 3, &h), RF_OK);
+    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {0};
+    for (size_t k = 0; k < COUNT * STRIDE; ++k)
+        if (k % STRIDE < 3)
+        {
+            low[k % STRIDE] = fminf(low[k % STRIDE], g_given[k]);
+            high[k % STRIDE] = fmaxf(high[k % STRIDE], g_given[k]);
+        }
+    bool reached = false;
+    for (uint64_t k = 0; k < 5000; ++k)
+    {
+        float g[3], value[3];
+        for (int c = 0; c < 3; ++c)
+            g[c] = 10 * rf_random_float(8, 0, k, (uint64_t)c) - 5;
+        rf_histogram_invert(&h, 0, g, value);
+        for (int c = 0; c < 3; ++c)
+        {
+            assert_true(value[c] >= low[c] && value[c] <= high[c]);
+            reached = reached || value[c] == low[c];
+        }
+    }
+    assert_true(reached);
+    rf_histogram_free(&h);
 }
 
 static void ties_are_ranked_by_pixel_and_map_back_to_one_value(void **state)
@@ -233,6 +263,7 @@ int main(void)
         cmocka_unit_test(values_become_gaussian_and_come_back_within_a_quantile_whatever_the_channels),
         cmocka_unit_test(principal_axes_are_uncorrelated_and_the_largest_comes_first),
         cmocka_unit_test(a_constant_picture_comes_back_whatever_was_blended),
+        cmocka_unit_test(whatever_was_blended_maps_back_into_the_pictures_range),
         cmocka_unit_test(ties_are_ranked_by_pixel_and_map_back_to_one_value),
         cmocka_unit_test(a_coarser_level_keeps_the_mean_colour),
     };

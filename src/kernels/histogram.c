@@ -109,6 +109,19 @@ static void principal_axes(const float *pixels, size_t count, size_t stride, flo
             axes[a][c] = (float)v[c][order[a]];
 }
 
+static void measure_range(const float *pixels, size_t count, size_t stride, RfHistogram *out)
+{
+    for (int c = 0; c < out->channels; ++c)
+    {
+        out->low[c] = out->high[c] = pixels[c];
+        for (size_t i = 1; i < count; ++i)
+        {
+            out->low[c] = rf_min(out->low[c], pixels[i * stride + (size_t)c]);
+            out->high[c] = rf_max(out->high[c], pixels[i * stride + (size_t)c]);
+        }
+    }
+}
+
 static void rotate_to_axes(float *pixels, size_t count, size_t stride, const float axes[3][3])
 {
     for (size_t i = 0; i < count; ++i)
@@ -159,6 +172,7 @@ RfResult rf_histogram_create(float *pixels, size_t count, size_t stride, int cha
         rf_histogram_free(out);
         return RF_OUT_OF_MEMORY;
     }
+    measure_range(pixels, count, stride, out);
     if (channels == 3)
     {
         principal_axes(pixels, count, stride, out->axes);
@@ -228,6 +242,7 @@ void rf_histogram_invert(const RfHistogram *histogram, int level, const float *g
         return;
     }
     for (int c = 0; c < 3; ++c)
-        value[c] =
-            histogram->axes[0][c] * along[0] + histogram->axes[1][c] * along[1] + histogram->axes[2][c] * along[2];
+        value[c] = rf_clamp(histogram->axes[0][c] * along[0] + histogram->axes[1][c] * along[1] +
+                                histogram->axes[2][c] * along[2],
+                            histogram->low[c], histogram->high[c]);
 }

@@ -18,6 +18,8 @@ typedef struct RfHistogram
     float axes[3][3];
     /// Along each axis, before it was made Gaussian.
     float variance[3];
+    /// Of the map's channels: what is mapped back stays within, since the axes' values need not belong together.
+    float low[3], high[3];
     /// [RF_TEXTURE_LEVELS][channels][RF_INVERSE_SIZE]: value along an axis at g = -RF_INVERSE_REACH ...
     /// RF_INVERSE_REACH.
     float *inverse;
