@@ -103,8 +103,10 @@ static RfResult check_header(const Header *header, const RfLagrangian *l, const 
         return rf_fail(RF_BAD_INPUT, NULL, "header",
                        "saved with another exemplar or other options: start again without it");
     size_t vertices = (size_t)(l->options.grid_vertices * l->options.grid_vertices) * sizeof(float);
-    bool sizes_fit = header->count >= 0 && header->width >= 1 && header->width <= RF_MAX_SIZE && header->height >= 1 &&
-                     header->height <= RF_MAX_SIZE && isfinite(header->time) &&
+    // Before the first step there is no size yet.
+    int least = header->started ? 1 : 0;
+    bool sizes_fit = header->count >= 0 && header->width >= least && header->width <= RF_MAX_SIZE &&
+                     header->height >= least && header->height <= RF_MAX_SIZE && isfinite(header->time) &&
                      size == sizeof(Header) + (size_t)header->count * (sizeof(Grid) + 3 * vertices);
     if (!sizes_fit ||
         header->content_hash != hash_content(*header, (const uint8_t *)block + sizeof(Header), size - sizeof(Header)))
