@@ -32,7 +32,6 @@ static int code_of(RfResult result)
     case RF_OK:
         return CODE_DONE;
     case RF_INVALID_ARGUMENT:
-    case RF_EXISTS:
         return CODE_USAGE;
     case RF_UNREADABLE:
     case RF_BAD_INPUT:

@@ -33,7 +33,8 @@ install(FILES ${CMAKE_BINARY_DIR}/riffle.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/
 if(BUILD_TESTING)
   set(install_tests ${CMAKE_SOURCE_DIR}/tests/install)
   add_test(NAME the_library_exports_what_its_headers_declare
-           COMMAND bash ${install_tests}/check_symbols.sh ${CMAKE_SOURCE_DIR} $<TARGET_FILE:riffle_shared>)
+           COMMAND bash ${install_tests}/check_symbols.sh ${CMAKE_SOURCE_DIR} $<TARGET_FILE:riffle_shared>
+                   $<TARGET_FILE:riffle_static>)
   # A program without sanitizers cannot load a library with them.
   if(NOT RIFFLE_SANITIZE)
     foreach(way pkg_config find_package static)

@@ -4,6 +4,10 @@ file(GLOB RIFFLE_TEST_SOURCES CONFIGURE_DEPENDS tests/test_*.c)
 
 add_library(riffle_test_support STATIC EXCLUDE_FROM_ALL tests/support/empty.c ${RIFFLE_TEST_SUPPORT})
 target_compile_definitions(riffle_test_support PRIVATE _GNU_SOURCE)
+# Tests provoke misuse only where the library answers it.
+if(RIFFLE_STOP_ON_MISUSE)
+  target_compile_definitions(riffle_test_support PUBLIC RF_STOP_ON_MISUSE)
+endif()
 target_include_directories(riffle_test_support PUBLIC src tests)
 target_link_libraries(riffle_test_support PUBLIC riffle_static kissfft::kissfft OpenMP::OpenMP_C m)
 

@@ -186,6 +186,9 @@ static void make_vtk_and_netcdf(void)
     test_vti(&bytes, &vti);
     put_bytes("scalar.vti", &bytes);
     put_text("text.vti", "no XML\n");
+    put_text("large.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 32768 0 32768 0 0\"><Piece><CellData>"
+                          "<DataArray Name=\"velocity\" type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">"
+                          "1 2 3</DataArray></CellData></Piece></ImageData></VTKFile>");
     put_text("open.vti", "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 4 0 4 0 1\">");
     bytes = (TestBytes){0};
     static const char *const names[] = {"y", "x"};
@@ -344,6 +347,7 @@ static void broken_flows_are_told_by_name_and_place(void **state)
         {"texture scalar.vti" WITH, 3, "scalar.vti: no velocity here: looked for "},
         {"texture text.vti" WITH, 3, "text.vti:line 1: "},
         {"texture open.vti" WITH, 3, "open.vti:line 1: "},
+        {"texture large.vti" WITH, 3, "large.vti:array velocity: it does not hold as many numbers as the extent says"},
         {"texture salt.nc" WITH, 3, "salt.nc: no velocity here: looked for u, v "},
         {"texture cut.nc" WITH, 3, "cut.nc: "},
         {"texture text.nc" WITH, 3, "text.nc: cannot be read as NetCDF"},

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/memory.h"
+#include "core/options.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "riffle/riffle.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <string.h>
@@ -74,6 +76,32 @@ static void random_numbers_are_uniform_and_independent_of_order(void **state)
     assert_true(lagged / n < 0.001 && lagged / n > -0.001);
 }
 
+typedef struct Choices
+{
+    uint32_t struct_size;
+    float stretch;
+} Choices;
+
+static RfResult check_stretch(float stretch)
+{
+    static const RfOption table[] = {{"stretch", RF_OPTION_FLOAT, offsetof(Choices, stretch), "", 1.05, 0.1 + 1.1, 1.1,
+                                      NULL, "Neither end of the range is a float."}};
+    Choices choices = {sizeof choices, stretch};
+    return rf_options_check(&choices, choices.struct_size, sizeof choices, "defaults", table, 1);
+}
+
+static void an_option_may_lie_on_the_ends_of_its_range_and_not_beyond(void **state)
+{
+    (void)state;
+    assert_int_equal(check_stretch(1.05f), RF_OK);
+    assert_int_equal(check_stretch(1.2f), RF_OK);
+#ifndef RF_STOP_ON_MISUSE
+    assert_int_equal(check_stretch(nextafterf(1.05f, 0)), RF_INVALID_ARGUMENT);
+    assert_int_equal(check_stretch(nextafterf(1.2f, 2)), RF_INVALID_ARGUMENT);
+    assert_int_equal(check_stretch(NAN), RF_INVALID_ARGUMENT);
+#endif
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -81,6 +109,7 @@ int main(void)
         cmocka_unit_test(an_arena_learns_its_peak),
         cmocka_unit_test(every_item_runs_once_for_any_number_of_threads),
         cmocka_unit_test(random_numbers_are_uniform_and_independent_of_order),
+        cmocka_unit_test(an_option_may_lie_on_the_ends_of_its_range_and_not_beyond),
     };
     return cmocka_run_group_tests_name("core", tests, NULL, NULL);
 }

@@ -287,7 +287,10 @@ static void a_shear_over_rising_latitudes_is_turned_round_sign_and_all(void **st
 {
     (void)state;
     if (no_netcdf())
+    {
+        print_message("this build reads no NetCDF\n");
         skip();
+    }
     // u grows northwards, v is northward; 0.5 degree rows from 59.5 to 60.5 north, 1 degree columns.
     const double lat[] = {59.5, 60, 60.5}, lon[] = {5, 6};
     const double u[] = {10, 10, 20, 20, 30, -99}, v[] = {3, 3, 3, 3, 3, 3};
@@ -322,7 +325,10 @@ static void packed_moments_over_metres_are_scaled(void **state)
 {
     (void)state;
     if (no_netcdf())
+    {
+        print_message("this build reads no NetCDF\n");
         skip();
+    }
     // Moments 1 and 2 m/s along x, 4 m cells; y falls, so the rows stay.
     const char *const names[] = {"time", "depth", "y", "x"};
     const int sizes[] = {2, 2, 2, 2};
@@ -564,6 +570,55 @@ static void broken_text_is_refused_with_a_reason(void **state)
     }
 }
 
+static size_t g_largest;
+
+static void *allocate_and_note(size_t bytes, size_t alignment, void *user)
+{
+    (void)user;
+    g_largest = bytes > g_largest ? bytes : g_largest;
+    return bytes < (size_t)1 << 30 ? aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment) : NULL;
+}
+
+static void release_noted(void *memory, void *user)
+{
+    (void)user;
+    free(memory);
+}
+
+static void a_small_file_with_a_large_extent_is_refused_before_memory_is_asked_for(void **state)
+{
+    (void)state;
+    static const char *const codings[] = {"ascii", "binary", "raw", "base64"};
+    const RfAllocator noting = {allocate_and_note, release_noted, NULL};
+    const double values[8] = {0};
+    for (int i = 0; i < 8; ++i)
+    {
+        TestVti vti = {2, 2, 1, {1, 1}, "velocity", 2, values, codings[i % 4], "Float32", .compressed = i > 4};
+        test_vti(&file, &vti);
+        file.data[file.size] = '\0';
+        // "0 2 0 2 0 ..." in WholeExtent and Extent.
+        static TestBytes large;
+        large.size = 0;
+        char *from = (char *)file.data, *at;
+        while ((at = strstr(from, "0 2 0 2 0")) != NULL)
+        {
+            test_bytes_add(&large, from, (size_t)(at - from));
+            test_bytes_text(&large, "0 32768 0 32768 0");
+            from = at + 9;
+        }
+        test_bytes_add(&large, from, file.size - (size_t)(from - (char *)file.data));
+        assert_true(from > (char *)file.data);
+        file = large;
+        const char *path = save("large.vti");
+        g_largest = 0;
+        rf_set_allocator(&noting);
+        assert_refused(path, NULL, RF_BAD_INPUT, "");
+        rf_set_allocator(NULL);
+        assert_true(g_largest < 100000);
+        assert_non_null(strstr(rf_last_error()->place, "array velocity"));
+    }
+}
+
 static void broken_numbers_are_refused_with_a_reason(void **state)
 {
     (void)state;
@@ -593,7 +648,10 @@ static void a_damaged_netcdf_is_refused(void **state)
 {
     (void)state;
     if (no_netcdf())
+    {
+        print_message("this build reads no NetCDF\n");
         skip();
+    }
     file.size = 0;
     test_bytes_add(&file, "\x89HDF\r\n\x1a\n and nothing that HDF5 knows", 36);
     assert_refused(save("b.nc"), NULL, RF_BAD_INPUT, "NetCDF");
@@ -668,7 +726,10 @@ static void real_files_read_with_their_known_sizes(void **state)
     {
         const char *path = test_data_file(cases[i].name);
         if (!path)
+        {
+            print_message("%s is not among the data\n", cases[i].name);
             skip();
+        }
         if (strcmp(cases[i].format, "nc") == 0 && no_netcdf())
             continue;
         RfFlow *flow = open_flow(path, NULL);
@@ -704,7 +765,10 @@ static void real_flows_converge_less_than_with_v_the_other_way(void **state)
     {
         const char *path = test_data_file(names[i]);
         if (!path)
+        {
+            print_message("%s is not among the data\n", names[i]);
             skip();
+        }
         RfFlowView view;
         RfFlow *flow = open_first(path, &view);
         assert_true(divergence(&view, 1) < 0.8 * divergence(&view, -1));
@@ -736,6 +800,7 @@ int main(void)
         cmocka_unit_test(what_is_written_reads_back_the_same),
         cmocka_unit_test(broken_text_is_refused_with_a_reason),
         cmocka_unit_test(broken_numbers_are_refused_with_a_reason),
+        cmocka_unit_test(a_small_file_with_a_large_extent_is_refused_before_memory_is_asked_for),
         cmocka_unit_test(a_damaged_netcdf_is_refused),
         cmocka_unit_test(a_library_that_dies_is_survived),
         cmocka_unit_test(options_out_of_range_are_refused),

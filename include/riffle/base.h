@@ -23,7 +23,8 @@
 typedef enum RfResult
 {
     RF_OK = 0,
-    /// The caller's mistake: an option out of its range, a NULL, sizes that do not agree. Debug builds stop there.
+    /// The caller's mistake: an option out of its range, a NULL, sizes that do not agree. Builds with
+    /// RIFFLE_STOP_ON_MISUSE=ON (the debug preset) stop there.
     RF_INVALID_ARGUMENT,
     /// A file is missing, cannot be opened or cannot be read.
     RF_UNREADABLE,
@@ -31,8 +32,6 @@ typedef enum RfResult
     RF_BAD_INPUT,
     /// The content is fine, but this build or version cannot deal with it.
     RF_UNSUPPORTED,
-    /// The output exists already and replacing it was not allowed.
-    RF_EXISTS,
     /// Writing failed: disk full, place not writable, the video encoder died.
     RF_WRITE_FAILED,
     RF_OUT_OF_MEMORY,
@@ -85,13 +84,18 @@ RF_API int rf_threads(void);
 /// agree within 1e-5.
 RF_API const char *rf_simd_name(void);
 
-/// Progress of a long call. `report` gets the stage's name and the fraction done, 0 to 1; it returns false to stop the
-/// call, which then returns RF_CANCELLED and leaves nothing half-done. Called from the calling thread only.
+/// Progress of a long call. `report` gets the stage's name and the fraction of it done, 0 to 1, which does not decrease
+/// while the stage lasts; it returns false to stop the call, which then returns RF_CANCELLED and leaves nothing
+/// half-done. Called from the calling thread only, several times a second as a rule.
 typedef struct RfProgress
 {
     bool (*report)(void *user, const char *stage, double fraction);
     void *user;
 } RfProgress;
+
+/// Every later long call of this thread reports to it; NULL ends that. The struct is borrowed. A report may not call
+/// the library.
+RF_API void rf_set_progress(const RfProgress *progress);
 
 typedef enum RfOptionKind
 {

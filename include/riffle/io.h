@@ -38,7 +38,7 @@ RF_API int rf_sequence_number(const RfSequence *sequence, int index);
 
 typedef struct RfFlowReadOptions
 {
-    /// Set by rf_flow_read_defaults().
+    /// Set by rf_flow_read_defaults(); tells a program built against another version.
     uint32_t struct_size;
     /// Frames a second, > 0. Turns velocities given in world units a second into cells a frame. Default 24.
     float fps;

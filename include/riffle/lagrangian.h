@@ -21,7 +21,7 @@ typedef enum RfBlend
 /// Start from rf_lagrangian_defaults() or rf_lagrangian_paper(). A struct that did not is refused.
 typedef struct RfLagrangianOptions
 {
-    /// Set by the defaults. Lets the struct grow without breaking programs built against an older one.
+    /// Set by the defaults; tells a program built against another version.
     uint32_t struct_size;
 
     /// Same seed and same input: same bytes, with any number of threads. Default 1.

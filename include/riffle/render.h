@@ -17,7 +17,7 @@ typedef enum RfFlowPicture
 
 typedef struct RfFlowPictureOptions
 {
-    /// Set by rf_flow_picture_defaults().
+    /// Set by rf_flow_picture_defaults(); tells a program built against another version.
     uint32_t struct_size;
     uint64_t seed;
     RfFlowPicture picture;

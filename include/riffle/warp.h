@@ -8,7 +8,7 @@
 
 typedef struct RfWarpOptions
 {
-    /// Set by rf_warp_defaults().
+    /// Set by rf_warp_defaults(); tells a program built against another version.
     uint32_t struct_size;
     /// Where the exemplar starts in the frame is drawn from it. Default 1.
     uint64_t seed;

@@ -30,6 +30,12 @@ static double field_value(const void *options, const RfOption *option)
     return 0;
 }
 
+/// A float was rounded on its way into the struct, so its bounds are rounded alike: 1.05 is in a range from 1.05.
+static double bound(RfOptionKind kind, double value)
+{
+    return kind == RF_OPTION_FLOAT ? (double)(float)value : value;
+}
+
 RfResult rf_options_check(const void *options, uint32_t struct_size, size_t size, const char *defaults_name,
                           const RfOption *table, int count)
 {
@@ -38,9 +44,10 @@ RfResult rf_options_check(const void *options, uint32_t struct_size, size_t size
     for (int i = 0; i < count; ++i)
     {
         double value = field_value(options, &table[i]);
+        double least = bound(table[i].kind, table[i].minimum), most = bound(table[i].kind, table[i].maximum);
         // Written so that NaN fails.
-        RF_REQUIRE(value >= table[i].minimum && value <= table[i].maximum, "%s %g: must be %g to %g", table[i].name,
-                   value, table[i].minimum, table[i].maximum);
+        RF_REQUIRE(value >= least && value <= most, "%s %g: must be %g to %g", table[i].name, value, table[i].minimum,
+                   table[i].maximum);
     }
     return RF_OK;
 }

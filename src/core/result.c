@@ -33,8 +33,8 @@ const RfError *rf_last_error(void)
 
 const char *rf_result_name(RfResult result)
 {
-    static const char *const names[] = {"ok",     "invalid argument", "unreadable",    "bad input", "unsupported",
-                                        "exists", "write failed",     "out of memory", "cancelled"};
+    static const char *const names[] = {"ok",          "invalid argument", "unreadable",    "bad input",
+                                        "unsupported", "write failed",     "out of memory", "cancelled"};
     size_t count = sizeof names / sizeof names[0];
     return (size_t)result < count ? names[result] : "unknown";
 }

@@ -11,17 +11,23 @@
 __attribute__((format(printf, 4, 5))) RfResult rf_fail(RfResult result, const char *file, const char *place,
                                                        const char *format, ...);
 
-/// The caller's mistake: a debug build stops, others return RF_INVALID_ARGUMENT with the message.
+/// The caller's mistake: a build with RIFFLE_STOP_ON_MISUSE=ON stops, others return RF_INVALID_ARGUMENT with the
+/// message.
 #ifdef RF_STOP_ON_MISUSE
-#define RF_REQUIRE(condition, ...) assert((condition) && "the caller's mistake")
+#define RF_MISUSE() assert(!"the caller's mistake, told in rf_last_error()")
 #else
+#define RF_MISUSE() ((void)0)
+#endif
 #define RF_REQUIRE(condition, ...)                                                                                     \
     do                                                                                                                 \
     {                                                                                                                  \
         if (!(condition))                                                                                              \
-            return rf_fail(RF_INVALID_ARGUMENT, NULL, NULL, __VA_ARGS__);                                              \
+        {                                                                                                              \
+            RfResult rf_misuse = rf_fail(RF_INVALID_ARGUMENT, NULL, NULL, __VA_ARGS__);                                \
+            RF_MISUSE();                                                                                               \
+            return rf_misuse;                                                                                          \
+        }                                                                                                              \
     } while (0)
-#endif
 
 /// Hands a failure up.
 #define RF_TRY(expression)                                                                                             \

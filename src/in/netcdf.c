@@ -22,6 +22,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 static bool netcdf_probe(const uint8_t *bytes, size_t size)
 {
@@ -435,8 +436,36 @@ static void write_conventions(const Reader *reader, bool holes, char text[256])
              holes ? "; fill values masked" : "");
 }
 
+// A classic file holds every number of its variables as it is, unlike NetCDF 4, where what was never written takes no
+// room: one that is too small for a moment is refused before memory for it is asked for.
+static RfResult check_file_size(const Reader *reader)
+{
+    int format = 0;
+    uint64_t bytes = 0, size = reader->source->size;
+    nc_inq_format(reader->file, &format);
+    if (format == NC_FORMAT_NETCDF4 || format == NC_FORMAT_NETCDF4_CLASSIC)
+        return RF_OK;
+    for (int c = 0; c < 2; ++c)
+    {
+        nc_type type = NC_BYTE;
+        size_t number = 1;
+        nc_inq_vartype(reader->file, reader->components[c].id, &type);
+        nc_inq_type(reader->file, type, NULL, &number);
+        bytes += (uint64_t)reader->x.count * reader->y.count * number;
+    }
+    struct stat status;
+    if (!reader->source->bytes && stat(reader->source->path, &status) == 0)
+        size = (uint64_t)status.st_size;
+    if (size < bytes)
+        return rf_fail(RF_BAD_INPUT, reader->source->path, "data",
+                       "%zu x %zu cells need %llu bytes, the file has %llu: it is cut", reader->x.count,
+                       reader->y.count, (unsigned long long)bytes, (unsigned long long)size);
+    return RF_OK;
+}
+
 static RfResult take_moment(const Reader *reader, int moment, RfFlowMoment *out)
 {
+    RF_TRY(check_file_size(reader));
     RF_TRY(rf_flow_moment_create(reader->source, (int64_t)reader->x.count, (int64_t)reader->y.count, out));
     double *block = rf_allocate(BLOCK, sizeof *block);
     if (!block)

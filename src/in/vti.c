@@ -98,20 +98,23 @@ static RfResult find_plane(const RfFlowSource *source, const RfVtkImage *image, 
     return RF_OK;
 }
 
+/// The first component's numbers are read before the field is made, so that a small file with a large extent is refused
+/// before much memory is asked for.
 static RfResult take_component(const RfFlowSource *source, const RfVtkImage *image, const Plane *plane, int c,
-                               RfFlowField *field)
+                               RfFlowMoment *out)
 {
     const RfVtkArray *array = plane->components[c];
     size_t cells = (size_t)plane->width * (size_t)plane->height, step = (size_t)array->components;
     float *numbers;
     RF_TRY(rf_vtk_array_read(image, array, cells * step, &numbers));
+    RfResult result = c == 0 ? rf_flow_moment_create(source, plane->width, plane->height, out) : RF_OK;
     double scale = 1 / (image->spacing[plane->axes[c]] * (double)source->options->fps);
     // Names of two scalars are those of the components in the plane.
     size_t part = step > 1 ? (size_t)plane->axes[c] : 0;
-    for (size_t k = 0; k < cells; ++k)
-        field->velocity[2 * k + (size_t)c] = (float)((c ? -scale : scale) * (double)numbers[k * step + part]);
+    for (size_t k = 0; result == RF_OK && k < cells; ++k)
+        out->field.velocity[2 * k + (size_t)c] = (float)((c ? -scale : scale) * (double)numbers[k * step + part]);
     rf_release(numbers);
-    return RF_OK;
+    return result;
 }
 
 static RfResult take_mask(const RfVtkImage *image, const Plane *plane, RfFlowField *field)
@@ -136,9 +139,8 @@ static RfResult vti_read(const RfFlowSource *source, int moment, RfFlowMoment *o
     Plane plane = {0};
     RF_TRY(rf_vtk_image_parse(source->path, source->bytes, source->size, &image));
     RF_TRY(find_plane(source, &image, &plane));
-    RF_TRY(rf_flow_moment_create(source, plane.width, plane.height, out));
     for (int c = 0; c < 2; ++c)
-        RF_TRY(take_component(source, &image, &plane, c, &out->field));
+        RF_TRY(take_component(source, &image, &plane, c, out));
     RF_TRY(take_mask(&image, &plane, &out->field));
     rf_flow_field_flip_rows(&out->field);
     out->moment_count = 1;

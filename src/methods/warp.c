@@ -80,7 +80,8 @@ static const RfOption g_options[] = {
 
 const RfOption *rf_warp_option_table(int *count)
 {
-    *count = (int)(sizeof g_options / sizeof *g_options);
+    if (count)
+        *count = (int)(sizeof g_options / sizeof *g_options);
     return g_options;
 }
 
