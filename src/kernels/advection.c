@@ -11,6 +11,9 @@
 
 #include <assert.h>
 
+// Pixels; what an absurd velocity carries farther (or to NaN) stops here, where integers still hold it.
+#define FARTHEST 1e6f
+
 enum
 {
     MAX_SUBSTEPS = 16,
@@ -67,7 +70,7 @@ int rf_advect_grid(float *x, float *y, bool *inside, int n, const RfFlowView *vi
     if (span > 0)
     {
         evaluate(&stage, x, y, NULL, 0, from, k1);
-        int steps = rf_clamp_int((int)ceilf(greatest_speed_in_cells(&stage, k1) * (float)span * 0.5f), 1, MAX_SUBSTEPS);
+        int steps = (int)rf_clamp(ceilf(greatest_speed_in_cells(&stage, k1) * (float)span * 0.5f), 1, MAX_SUBSTEPS);
         float h = (float)(span / steps);
         for (int s = 0; s < steps; ++s)
         {
@@ -79,8 +82,8 @@ int rf_advect_grid(float *x, float *y, bool *inside, int n, const RfFlowView *vi
             evaluate(&stage, x, y, k3, h, t + h, k4);
             for (int i = 0; i < n * n; ++i)
             {
-                x[i] += h / 6 * (k1[i].x + 2 * k2[i].x + 2 * k3[i].x + k4[i].x);
-                y[i] += h / 6 * (k1[i].y + 2 * k2[i].y + 2 * k3[i].y + k4[i].y);
+                x[i] = rf_clamp(x[i] + h / 6 * (k1[i].x + 2 * k2[i].x + 2 * k3[i].x + k4[i].x), -FARTHEST, FARTHEST);
+                y[i] = rf_clamp(y[i] + h / 6 * (k1[i].y + 2 * k2[i].y + 2 * k3[i].y + k4[i].y), -FARTHEST, FARTHEST);
             }
         }
     }

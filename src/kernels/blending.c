@@ -42,6 +42,9 @@ typedef float Vec8 __attribute__((vector_size(32), aligned(4), may_alias));
 // A row's ends are not drawn where others outweigh the grid by this: half a grey level at the most.
 #define NEGLIGIBLE (1.0f / 256)
 
+// Tile pixels.
+#define FARTHEST 1e6f
+
 enum
 {
     MAX_TAPS = 4,
@@ -138,7 +141,9 @@ RF_WIDE_BODY void place_vertices(const RfDrawJob *job, const RfDrawGrid *grid, c
 #pragma omp simd
     for (int k = 0; k < count; ++k)
     {
-        float x = (grid->x[k] - job->origin.x) * inverse, y = (grid->y[k] - job->origin.y) * inverse;
+        // NaN and the absurdly far come to rest where integers still hold them.
+        float x = rf_clamp((grid->x[k] - job->origin.x) * inverse, -FARTHEST, FARTHEST);
+        float y = rf_clamp((grid->y[k] - job->origin.y) * inverse, -FARTHEST, FARTHEST);
         vertices->x[k] = x;
         vertices->y[k] = y;
         vertices->outside[k] = (uint8_t)((x < region->x0 ? 1 : 0) | (x > region->x1 ? 2 : 0) |

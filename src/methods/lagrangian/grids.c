@@ -13,6 +13,11 @@
 
 #include <string.h>
 
+// A grid is retired once its border comes nearer to its centre than this, in Poisson-disk radii. The paper has 1. K_g
+// fades the border anyway, and on the two-vortex scene each tenth less spares 5 % of the births and costs noise 0.13 of
+// its spectrum ratio.
+#define COVER_RADIUS 0.9f
+
 // A fade takes this share of the time that the local strain leaves it. On the two-vortex scene 1 draws a fifth more
 // layers and smears more, 0.35 flickers.
 #define FADE_SHARE 0.6f
@@ -192,7 +197,7 @@ static void measure_grid(RfLagrangian *l, const StepFlow *flow, int index, const
         sum = rf_vec2_add(sum, vertex(&v, k));
     grid->centre = (RfVec2){sum.x / (float)(n * n), sum.y / (float)(n * n)};
     grid->folded = measure_quality(l, &v, inside, quality);
-    grid->uncovering = !covers_kernel(&v, inside, grid->centre, l->radius);
+    grid->uncovering = !covers_kernel(&v, inside, grid->centre, COVER_RADIUS * l->radius);
     grid->least_quality = 1;
     grid->greatest_quality = 0;
     grid->worn = false;
@@ -299,6 +304,7 @@ static RfResult retire_close_pairs(RfLagrangian *l, double time)
 RfResult rf_lagrangian_grids_retire(RfLagrangian *l, const StepFlow *flow)
 {
     double time = flow->view->time;
+    rf_lagrangian_grids_drop(l);
     for (int i = 0; i < l->count; ++i)
         if (!l->grids[i].retired && (l->grids[i].worn || l->grids[i].folded || l->grids[i].uncovering))
             retire(l, i, time);

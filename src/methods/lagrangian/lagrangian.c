@@ -33,7 +33,7 @@ static const RfOption option_table[] = {
      "d^2."},
     {"grid-vertices", RF_OPTION_INT, FIELD(grid_vertices), "", 4, 32, 8, NULL,
      "Vertices along a side of a grid. More bend with finer motion; cost grows as the square."},
-    {"max-distortion", RF_OPTION_FLOAT, FIELD(max_distortion), "", 1.05, 100, 2.1, NULL,
+    {"max-distortion", RF_OPTION_FLOAT, FIELD(max_distortion), "", 1.05, 100, 2, NULL,
      "Stretch or squash at which a texture is invisible. Smaller keeps the exemplar's look, larger follows the flow "
      "for longer."},
     {"fade", RF_OPTION_FLOAT, FIELD(fade), "s", 0, 1000, 5, NULL, "Longest time a grid takes to fade in or out."},
@@ -41,7 +41,7 @@ static const RfOption option_table[] = {
      "How far fades shorten where the flow strains: 0 not at all, 1 to end at the distortion limit."},
     {"sharpness", RF_OPTION_FLOAT, FIELD(sharpness), "", 0.25, 12, 2, NULL,
      "Power of the kernel weight. 1 mixes several pictures everywhere, larger keeps the shapes of one."},
-    {"candidates", RF_OPTION_INT, FIELD(candidates), "", 1, 1000000, 12, NULL,
+    {"candidates", RF_OPTION_INT, FIELD(candidates), "", 1, 1000000, 10, NULL,
      "Places in the exemplar tried for a new grid; the best fit to what is drawn there is taken. 1 takes any."},
     {"blend", RF_OPTION_CHOICE, FIELD(blend), "", 0, 2, RF_BLEND_CONTRAST, "plain|contrast|histogram",
      "Weighted mean; the same with mean and variance kept; or with the whole histogram kept."},
@@ -66,11 +66,11 @@ RfLagrangianOptions rf_lagrangian_defaults(void)
                                  .seed = 1,
                                  .particle_radius = 0,
                                  .grid_vertices = 8,
-                                 .max_distortion = 2.1f,
+                                 .max_distortion = 2,
                                  .fade = 5,
                                  .adapt = 1,
                                  .sharpness = 2,
-                                 .candidates = 12,
+                                 .candidates = 10,
                                  .blend = RF_BLEND_CONTRAST,
                                  .fps = 24};
 }

@@ -34,7 +34,9 @@ enum
     // Pixels across a window at the coarsest spacing.
     WINDOW_PIXELS = 40,
     KEEP = 2,
-    MAX_OVERLAPS = 96
+    MAX_OVERLAPS = 96,
+    // Of random numbers, apart from the placing's: in the first step a grid's id is the number of its pick.
+    AREA_STREAM = 1 << 30
 };
 
 // Weights of others under this (to the power of the sharpness) count as none: the new grid is needed at once.
@@ -262,7 +264,7 @@ static RfVec2 random_offset(const Birth *birth)
     float side = GRID_SIDE * l->radius;
     float r[2];
     for (int axis = 0; axis < 2; ++axis)
-        r[axis] = rf_random_float(l->options.seed, l->step, l->grids[birth->index].id, (uint64_t)axis);
+        r[axis] = rf_random_float(l->options.seed, l->step, l->grids[birth->index].id, AREA_STREAM + (uint64_t)axis);
     float room_x = texture->tiles ? (float)texture->width : fmaxf((float)texture->width - side, 0);
     float room_y = texture->tiles ? (float)texture->height : fmaxf((float)texture->height - side, 0);
     return (RfVec2){r[0] * room_x - (birth->centre.x - 0.5f * side), r[1] * room_y - (birth->centre.y - 0.5f * side)};
