@@ -94,7 +94,9 @@ typedef struct Filter
 typedef struct Row
 {
     int first, end;
-    float weight[RF_TILE_PITCH], fx[RF_TILE_PITCH], fy[RF_TILE_PITCH];
+    float weight[RF_TILE_PITCH];
+    // One tap: shares of the left and right texel pair in the weight, fraction from the upper to the lower pair.
+    float left[RF_TILE_PITCH], right[RF_TILE_PITCH], fy[RF_TILE_PITCH];
     int index[RF_TILE_PITCH];
 } Row;
 
@@ -388,7 +390,7 @@ RF_WIDE_BODY Filter choose_filter(const RfDrawJob *job, const RfDrawGrid *grid)
 
 // Texel index and fractions over a row, shifted by one tap's offset.
 RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, const float *restrict u, const float *restrict v,
-                              RfVec2 shift, Row *row)
+                              RfVec2 shift, float share, Row *row)
 {
     float scale_x = level->scale_x, scale_y = level->scale_y, width = (float)level->width,
           height = (float)level->height;
@@ -397,7 +399,8 @@ RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, const flo
     // Where it tiles, rounding may give width itself: the padding holds the texel there.
     float last_x = tiles ? width : width - 1, last_y = tiles ? height : height - 1;
     int stride = level->stride;
-    float *restrict fx = row->fx, *restrict fy = row->fy;
+    const float *restrict weight = row->weight;
+    float *restrict left = row->left, *restrict right = row->right, *restrict fy = row->fy;
     int *restrict index = row->index;
     for (int block = row->first / WIDE * WIDE; block < row->end; block += WIDE)
 #pragma omp simd
@@ -409,7 +412,9 @@ RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, const flo
             s = rf_min(rf_max(s, 0), last_x);
             t = rf_min(rf_max(t, 0), last_y);
             int i = (int)s, j = (int)t;
-            fx[k] = s - (float)i;
+            float w = weight[k] * share, w1 = w * (s - (float)i);
+            left[k] = w - w1;
+            right[k] = w1;
             fy[k] = t - (float)j;
             index[k] = j * stride + i;
         }
@@ -417,7 +422,7 @@ RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, const flo
 
 // Sums one tap of one quad over a row. `turn` is a constant at every call, so the plain form pays nothing for it.
 RF_WIDE_BODY void sum_samples(const RfDrawGrid *grid, const float *restrict texels, int stride, const Row *row,
-                              float share, float *restrict sums, int turn)
+                              float *restrict sums, int turn)
 {
     float c = grid->turn_cos, s = turn == 1 ? -grid->turn_sin : grid->turn_sin;
     const Vec8 along = {c, c, 1, 1, c, c, 1, 1}, across = {-s, s, 0, 0, -s, s, 0, 0};
@@ -431,8 +436,9 @@ RF_WIDE_BODY void sum_samples(const RfDrawGrid *grid, const float *restrict texe
             Vec8 swapped = {r[1], r[0], r[2], r[3], r[5], r[4], r[6], r[7]};
             r = along * r + across * swapped;
         }
-        float weight = row->weight[k] * share, w1 = weight * row->fx[k], w0 = weight - w1;
-        r *= (Vec8){w0, w0, w0, w0, w1, w1, w1, w1};
+        float w0 = row->left[k], w1 = row->right[k];
+        Vec8 left = {w0, w0, w0, w0, w0, w0, w0, w0}, right = {w1, w1, w1, w1, w1, w1, w1, w1};
+        r *= __builtin_shufflevector(left, right, 0, 1, 2, 3, 12, 13, 14, 15);
         Vec4 *sum = (Vec4 *)(sums + (size_t)k * 4);
         Vec4 low = {r[0], r[1], r[2], r[3]}, high = {r[4], r[5], r[6], r[7]};
         *sum += low + high;
@@ -449,17 +455,18 @@ RF_WIDE_BODY void sum_row(const RfDrawJob *job, const RfDrawGrid *grid, const Fi
     for (int tap = 0; tap < filter->taps; ++tap)
     {
         float along = (float)tap - 0.5f * (float)(filter->taps - 1);
-        find_texels(level, job->texture->tiles, u, v, (RfVec2){along * filter->step.x, along * filter->step.y}, row);
+        find_texels(level, job->texture->tiles, u, v, (RfVec2){along * filter->step.x, along * filter->step.y}, share,
+                    row);
         for (int q = 0; q < job->texture->quads; ++q)
         {
             const float *texels = level->texels + (size_t)q * rf_texture_plane(level);
             float *colour = sums->colour + ((size_t)q * TILE_PIXELS + place) * 4;
             if (job->turned[q] == 0)
-                sum_samples(grid, texels, level->stride, row, share, colour, 0);
+                sum_samples(grid, texels, level->stride, row, colour, 0);
             else if (job->turned[q] == 1)
-                sum_samples(grid, texels, level->stride, row, share, colour, 1);
+                sum_samples(grid, texels, level->stride, row, colour, 1);
             else
-                sum_samples(grid, texels, level->stride, row, share, colour, 2);
+                sum_samples(grid, texels, level->stride, row, colour, 2);
         }
     }
     float *restrict w1 = sums->weight + place, *restrict w2 = sums->weight2 + place,
