@@ -98,7 +98,8 @@ RF_API RF_MUST_USE RfResult rf_lagrangian_advance(RfLagrangian *lagrangian, cons
 
 /// What the last step was made of, for renderers and compositors that shade themselves: for each pixel the four
 /// strongest grids, strongest first, as u v weight id. `layers` has 16 channels and the frame's size; u, v in exemplar
-/// pixels (not wrapped); weights are normalised to sum to 1 over all grids; missing grids are 0 0 0 -1.
+/// pixels (not wrapped); weights are normalised to sum to 1 over all grids; missing grids are 0 0 0 -1. Land is not
+/// left out.
 RF_API RF_MUST_USE RfResult rf_lagrangian_layers(const RfLagrangian *lagrangian, const RfImageView *layers);
 
 RF_API RfLagrangianStats rf_lagrangian_stats(const RfLagrangian *lagrangian);

@@ -27,7 +27,8 @@ enum
     KERNEL_LOBES = 8,
     SAMPLES_PER_LOBE = 256,
     TABLE_SIZE = KERNEL_LOBES * SAMPLES_PER_LOBE + 2,
-    MIN_SIDE = 8
+    MIN_SIDE = 8,
+    MAX_PIXELS = 1 << 27
 };
 
 // h(t), t in samples of the band's critical rate: the inverse transform of A below the band's edge, under a Hann
@@ -169,6 +170,11 @@ static RfResult make_level(const float *pixels, const float *table, int halvings
 RfResult rf_texture_create(const float *pixels, int width, int height, int quads, bool tiles, RfTexture *out)
 {
     assert(width > 0 && height > 0 && quads > 0 && quads <= RF_TEXTURE_QUADS);
+    *out = (RfTexture){0};
+    // Texels are numbered in 32 bits, and there are four to a pixel.
+    if ((int64_t)width * height > MAX_PIXELS)
+        return rf_fail(RF_UNSUPPORTED, NULL, NULL, "an exemplar of %d x %d pixels: at most %d pixels can be sampled",
+                       width, height, MAX_PIXELS);
     *out = (RfTexture){.width = width, .height = height, .quads = quads, .tiles = tiles};
     float table[TABLE_SIZE];
     make_kernel(table);

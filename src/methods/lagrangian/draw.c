@@ -430,6 +430,9 @@ RfResult rf_lagrangian_layers(const RfLagrangian *l, const RfImageView *layers)
 {
     RF_REQUIRE(l && layers && layers->pixels, "rf_lagrangian_layers: lagrangian or layers is NULL");
     RF_REQUIRE(l->started, "rf_lagrangian_layers: no step has been made");
+    RF_REQUIRE(layers->row_stride >= (ptrdiff_t)layers->width * layers->channels,
+               "rf_lagrangian_layers: rows of %d pixels do not fit a stride of %td floats", layers->width,
+               layers->row_stride);
     RF_REQUIRE(layers->channels == 16 && layers->width == l->width && layers->height == l->height,
                "rf_lagrangian_layers: %d x %d pixels of %d channels: must be %d x %d of 16", layers->width,
                layers->height, layers->channels, l->width, l->height);

@@ -13,13 +13,12 @@
 
 #include <string.h>
 
-// A grid is retired once its border comes nearer to its centre than this, in Poisson-disk radii. The paper has 1. K_g
-// fades the border anyway, and on the two-vortex scene each tenth less spares 5 % of the births and costs noise 0.13 of
-// its spectrum ratio.
+// A grid is retired once its border comes nearer to its centre than this, in Poisson-disk radii. The paper has 1; K_g
+// fades the border anyway, and fewer births flicker less.
 #define COVER_RADIUS 0.9f
 
-// A fade takes this share of the time that the local strain leaves it. On the two-vortex scene 1 draws a fifth more
-// layers and smears more, 0.35 flickers.
+// A fade takes this share of the time that the local strain leaves it: less flickers, more smears and draws more
+// layers.
 #define FADE_SHARE 0.6f
 
 RfResult rf_lagrangian_grids_reserve(RfLagrangian *l, int capacity)

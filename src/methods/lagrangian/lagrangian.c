@@ -210,6 +210,8 @@ RfResult rf_lagrangian_advance(RfLagrangian *l, const RfFlowView *flow, int widt
 RfResult rf_lagrangian_step(RfLagrangian *l, const RfFlowView *flow, const RfImageView *frame)
 {
     RF_REQUIRE(l && flow && frame && frame->pixels, "rf_lagrangian_step: lagrangian, flow or frame is NULL");
+    RF_REQUIRE(frame->row_stride >= (ptrdiff_t)frame->width * frame->channels,
+               "frame: rows of %d pixels do not fit a stride of %td floats", frame->width, frame->row_stride);
     RF_REQUIRE(frame->channels == l->exemplar->channels, "frame: %d channels: the exemplar has %d", frame->channels,
                l->exemplar->channels);
     RF_TRY(check_step(l, flow, frame->width, frame->height));

@@ -15,8 +15,7 @@
 enum
 {
     MAX_LANES = 4 * RF_TEXTURE_QUADS,
-    /// Older grids that a grid remembers its resemblance to; 9 is the most that a new grid overlaps noticeably in a
-    /// maximal distribution.
+    /// Older grids that a grid remembers its resemblance to: the strongest, should there be more.
     MAX_RESEMBLANCES = 12
 };
 
