@@ -99,6 +99,22 @@ clouds() {
     [ "$docs" != --docs ] || publish clouds
 }
 
+# Do shapes keep? Exemplar, frame 1 and frame 200, a row a material.
+shapes() {
+    wanted shapes || return 0
+    local folder=$out/shapes cells=() name
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    echo shapes
+    for name in bubbles foam pebbles lava; do
+        "$riffle" texture "builtin:turbulence?size=256x256&speed=1" "builtin:$name" "$folder/$name.%04d.png" \
+            --frames 1-200x199 --size 512x512 --progress none
+        cells+=("builtin:$name" "$folder/$name.0001.png" "$folder/$name.0200.png")
+    done
+    "$build/examples/contact_sheet" "$out/shapes.png" --columns 3 --cell 320 "${cells[@]}"
+    [ "$docs" != --docs ] || publish shapes
+}
+
 flows=$data/flows2d
 exemplars=$data/exemplars
 # Speeds of one to four pixels a frame; the moments spread over the frames drawn.
@@ -112,6 +128,7 @@ sheet cylinder-lava free "builtin:cylinder?size=256x128&speed=1" builtin:lava 96
 sheet gyre-pebbles free "builtin:gyre?size=512x256" builtin:pebbles 96
 sheet eddies-bubbles free "builtin:turbulence?size=256x256&speed=1" builtin:bubbles 96 --size 512x512
 clouds
+shapes
 
 # Real flows: wind (public domain, ISC), particle image velocimetry (BSD), a slice of turbulence (MIT).
 for flow in wind:gfs_wind piv:pivpy_day2 turbulence:example_data_HIT.nc; do
