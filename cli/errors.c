@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "errors.h"
+#include "stop.h"
 
 #include <math.h>
 #include <string.h>
@@ -39,8 +40,9 @@ static int code_of(RfResult result)
         return CODE_BAD_INPUT;
     case RF_WRITE_FAILED:
     case RF_OUT_OF_MEMORY:
-    case RF_CANCELLED:
         return CODE_FAILED;
+    case RF_CANCELLED:
+        return CODE_SIGNAL + stop_asked();
     }
     return CODE_FAILED;
 }

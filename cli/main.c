@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // riffle: the command. A new verb is one line in the table below and one file.
 #include "errors.h"
+#include "progress.h"
+#include "setup.h"
 #include "stop.h"
 #include "verbs.h"
 
@@ -48,7 +50,10 @@ static int run_verb(const Verb *verb, int count, char **words)
     else if (!code)
     {
         rf_set_threads(settings->threads);
+        setup_begin(settings);
         code = verb->run(settings);
+        if (setup_end() && code >= CODE_SIGNAL)
+            warn(settings, NULL, "stopped by signal %d before anything was made", code - CODE_SIGNAL);
     }
     free(settings);
     return code;

@@ -23,18 +23,23 @@ double now_seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+ProgressKind progress_kind(const Settings *settings)
+{
+    if (settings->quiet)
+        return PROGRESS_NONE;
+    if (settings->progress != PROGRESS_AUTO)
+        return settings->progress;
+    return isatty(STDERR_FILENO) ? PROGRESS_BAR : PROGRESS_PLAIN;
+}
+
 void progress_begin(Progress *progress, const Settings *settings, int total, int made_before)
 {
-    *progress = (Progress){.kind = settings->progress,
+    *progress = (Progress){.kind = progress_kind(settings),
                            .quiet = settings->quiet,
                            .verbose = settings->verbose,
                            .total = total,
                            .made_before = made_before,
                            .started = now_seconds()};
-    if (progress->kind == PROGRESS_AUTO)
-        progress->kind = isatty(STDERR_FILENO) ? PROGRESS_BAR : PROGRESS_PLAIN;
-    if (progress->quiet)
-        progress->kind = PROGRESS_NONE;
     progress->told = progress->started;
 }
 

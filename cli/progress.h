@@ -18,6 +18,8 @@ typedef struct Progress
 } Progress;
 
 double now_seconds(void);
+/// What the settings ask for, on this terminal.
+ProgressKind progress_kind(const Settings *settings);
 
 /// `made_before` of `total` frames are there already.
 void progress_begin(Progress *progress, const Settings *settings, int total, int made_before);

@@ -7,13 +7,16 @@
 //   worker   | compute 1 | compute 2      | compute 3 ...
 //   main                 | write 1, state | write 2, state ...
 //
-// After a signal the frame being computed gets 0.6 s to finish. If it does, it is written and the state saved; if not,
+// After a signal the frame being computed gets 0.4 s to finish, then the library is told to end it, and 0.6 s after the
+// signal it is waited for no more. If it is finished, it is written and the state saved; if not,
 // the program leaves without it: the last state is at most ten frames old, and these are made again.
 #include "run.h"
+#include "setup.h"
 #include "state.h"
 #include "stop.h"
 #include "worker.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -25,13 +28,24 @@ enum
 
 // Part of a frame's time that saving may take before it is done only every tenth frame.
 static const double g_saving_limit = 0.05;
-static const double g_grace_seconds = 0.6, g_poll_seconds = 0.05;
+// The library may end a frame for so long after a signal, and is waited for a little longer.
+static const double g_step_seconds = 0.4, g_grace_seconds = 0.6, g_poll_seconds = 0.05;
+
+/// What the library is doing for the worker.
+typedef struct Telling
+{
+    pthread_mutex_t lock;
+    char stage[64];
+    RfProgress progress;
+} Telling;
 
 /// One frame for the worker.
 typedef struct Job
 {
     const FrameSource *source;
     FrameSlot *slot;
+    /// The run's, told by the worker.
+    Telling *telling;
     int index, frame;
     bool drawn, save;
 } Job;
@@ -53,6 +67,7 @@ typedef struct Run
     /// 1 where nothing is written: a second frame in memory would be of no use.
     int slot_count;
     Worker worker;
+    Telling telling;
     /// Frames written by this run, and whether it continued another.
     int written;
     bool resumed;
@@ -64,10 +79,31 @@ static int drawn_number(const void *context, int index)
     return plan_number(plan, index * plan->step);
 }
 
+/// From the worker's thread. A frame that is nearly done is finished after a signal.
+static bool hear(void *user, const char *stage, double fraction)
+{
+    (void)fraction;
+    Telling *telling = user;
+    pthread_mutex_lock(&telling->lock);
+    snprintf(telling->stage, sizeof telling->stage, "%s", stage);
+    pthread_mutex_unlock(&telling->lock);
+    return stop_age() < g_step_seconds;
+}
+
+static void show_stage(Run *run)
+{
+    char stage[sizeof run->telling.stage];
+    pthread_mutex_lock(&run->telling.lock);
+    memcpy(stage, run->telling.stage, sizeof stage);
+    pthread_mutex_unlock(&run->telling.lock);
+    progress_stage(&run->progress, stage[0] ? stage : "computing");
+}
+
 static int compute(void *context)
 {
     Job *job = context;
     FrameSlot *slot = job->slot;
+    rf_set_progress(&job->telling->progress);
     double start = now_seconds();
     slot->stage_count = 0;
     slot->seconds = 0;
@@ -87,6 +123,7 @@ static void post(Run *run, int index)
     Job *job = &run->jobs[index % run->slot_count];
     *job = (Job){.source = run->source,
                  .slot = &run->slots[index % run->slot_count],
+                 .telling = &run->telling,
                  .index = index,
                  .frame = plan_number(run->plan, index),
                  .drawn = plan_drawn(run->plan, index),
@@ -97,15 +134,10 @@ static void post(Run *run, int index)
 /// Waits for the frame being computed. False: a signal came and it was not done in time.
 static bool await(Run *run, int *code)
 {
-    double asked = 0;
     while (!worker_wait(&run->worker, g_poll_seconds, code))
     {
-        progress_stage(&run->progress, "computing");
-        if (!stop_asked())
-            continue;
-        if (asked == 0)
-            asked = now_seconds();
-        if (now_seconds() - asked > g_grace_seconds)
+        show_stage(run);
+        if (stop_age() > g_grace_seconds)
             return false;
     }
     return true;
@@ -170,7 +202,7 @@ static void tell_stop(const Run *run)
 {
     const char *remedy = run->stateful ? "; --resume goes on from there" : "";
     warn(run->settings, NULL, "stopped by signal %d with %d of %d frames made%s", stop_asked(),
-         run->progress.made_before + run->progress.made, run->progress.total, remedy);
+         run->progress.made_before + run->progress.made, plan_drawn_count(run->plan), remedy);
 }
 
 /// The frame on the way cannot be waited for: what is open is closed, and the program leaves from here, since the
@@ -197,10 +229,6 @@ static int stop_run(Run *run, int index, bool posted)
     }
     if (!code && run->stateful)
         code = save_now(run, index);
-    outputs_close(run->outputs, false);
-    progress_clear(&run->progress);
-    if (!code)
-        tell_stop(run);
     return code ? code : CODE_SIGNAL + stop_asked();
 }
 
@@ -281,7 +309,9 @@ static int prepare(Run *run, int *first)
 static int run_prepared(Run *run, int first)
 {
     int drawn_before = first > 0 ? (first - 1) / run->plan->step + 1 : 0;
-    int code = run->stateful && !run->resumed ? state_write(&run->state, 0, NULL, 0) : CODE_DONE;
+    int code = stop_asked() ? CODE_SIGNAL + stop_asked() : CODE_DONE;
+    if (!code && run->stateful && !run->resumed)
+        code = state_write(&run->state, 0, NULL, 0);
     progress_begin(&run->progress, run->settings, plan_drawn_count(run->plan), drawn_before);
     if (!code && run->resumed)
         code = replay(run, first);
@@ -318,6 +348,8 @@ static int close_run(Run *run, int code)
         progress_done(&run->progress);
     else
         progress_clear(&run->progress);
+    if (code >= CODE_SIGNAL)
+        tell_stop(run);
     return code;
 }
 
@@ -331,9 +363,12 @@ int run_frames(const Settings *settings, const FramePlan *plan, const FrameSourc
     run->source = source;
     run->outputs = outputs;
     run->state_every = 1;
+    run->telling.progress = (RfProgress){hear, &run->telling};
+    pthread_mutex_init(&run->telling.lock, NULL);
     run->slot_count = outputs_idle(outputs) ? 1 : 2;
     int first = 0;
     int code = prepare(run, &first);
+    setup_end();
     code = code ? code : close_run(run, run_prepared(run, first));
     for (int i = 0; i < 2; ++i)
     {
@@ -343,6 +378,7 @@ int run_frames(const Settings *settings, const FramePlan *plan, const FrameSourc
         free(run->slots[i].velocity);
         free(run->slots[i].mask);
     }
+    pthread_mutex_destroy(&run->telling.lock);
     free(run);
     return code;
 }

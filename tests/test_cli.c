@@ -759,9 +759,63 @@ static void a_long_frame_does_not_hold_up_a_signal(void **state)
     test_folder_remove(&folder);
 }
 
+/// Runs a line, sends the signal `delay` seconds after its start, and returns the seconds from then to its end.
+static double stop_after(const TestFolder *folder, const char *line, double delay, int signal, int *code)
+{
+    Command command = command_start(PROGRAM, folder->path, line, NULL);
+    struct timespec start, end, wait = {0, (long)(1e9 * delay)};
+    nanosleep(&wait, NULL);
+    clock_gettime(CLOCK_MONOTONIC, &start);
+    kill(command.pid, signal);
+    CommandResult result = command_finish(&command);
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    *code = result.code;
+    command_free(&result);
+    return (double)(end.tv_sec - start.tv_sec) + 1e-9 * (double)(end.tv_nsec - start.tv_nsec);
+}
+
+static void a_signal_ends_a_long_setup_and_leaves_nothing(void **state)
+{
+    (void)state;
+    static const char *const lines[] = {
+        "texture builtin:river?size=2048x1024 builtin:foam?size=64 a.%04d.png -q",
+        "texture builtin:vortex builtin:pebbles?size=4096 a.%04d.png -q",
+        "texture builtin:vortex builtin:foam a.%04d.png --map rough=builtin:noise?size=4096 -q",
+        "convert builtin:lava?size=4096 a.png -q",
+        "info builtin:river?size=2048x1024",
+    };
+    for (int i = 0; i < 5; ++i)
+    {
+        TestFolder folder = test_folder_make();
+        int code = 0, signal = i % 2 ? SIGTERM : SIGINT;
+        double seconds = stop_after(&folder, lines[i], 0.3, signal, &code);
+        assert_int_equal(code, 128 + signal);
+        // One second is promised; the machine may be busy.
+        assert_true(seconds < 2);
+        // convert reads its image as a frame, behind the first state.
+        assert_int_equal(test_folder_count(&folder), i == 3);
+        test_folder_remove(&folder);
+    }
+}
+
+static void a_long_setup_is_told(void **state)
+{
+    (void)state;
+    static const char event[] = "{\"event\":\"setup\",\"stage\":\"drawing the exemplar\",\"fraction\":";
+    TestFolder folder = test_folder_make();
+    CommandResult result = run_in(&folder, "info builtin:lava?size=768 --json --threads 1");
+    assert_int_equal(result.code, 0);
+    assert_json_lines(result.err);
+    assert_int_equal(strncmp(result.err, event, sizeof event - 1), 0);
+    command_free(&result);
+    test_folder_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_signal_ends_a_long_setup_and_leaves_nothing),
+        cmocka_unit_test(a_long_setup_is_told),
         cmocka_unit_test(help_lists_exactly_the_options_that_are_there),
         cmocka_unit_test(help_lists_the_verbs_and_others_are_refused),
         cmocka_unit_test(the_version_is_the_librarys),

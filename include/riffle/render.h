@@ -28,7 +28,7 @@ typedef struct RfFlowPictureOptions
 RF_API RfFlowPictureOptions rf_flow_picture_defaults(void);
 
 /// Draws the velocity at view->time into a frame of 3 channels (sRGB-encoded) and any size. Outside the fluid the frame
-/// is dark grey.
+/// is dark grey. On failure `frame` holds its old pixels.
 RF_API RF_MUST_USE RfResult rf_flow_picture(const RfFlowView *view, const RfFlowPictureOptions *options,
                                             const RfImageView *frame);
 
@@ -47,6 +47,6 @@ RF_API RF_MUST_USE RfResult rf_shade(RfShader shader, const RfImageView *paramet
 
 /// Draws a height field (first channel, 0 to 1) with its colour as a lit surface in perspective, seen from the front
 /// and above. `relief` is the height of 1 in widths of the field. Frame: 3 channels, any size. height and colour (3
-/// channels) have one size.
+/// channels) have one size. On failure `frame` holds its old pixels.
 RF_API RF_MUST_USE RfResult rf_render_relief(const RfImageView *height, const RfImageView *colour, float relief,
                                              const RfImageView *frame);

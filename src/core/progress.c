@@ -6,8 +6,8 @@
 
 enum
 {
-    /// Reports of one rf_progress_for: a loop of 10 s asks every 0.15 s.
-    CHUNKS = 64,
+    /// Most reports of one rf_progress_for: a loop of a minute asks every 0.12 s.
+    CHUNKS = 512,
     /// Items a thread and chunk at the least, so that threads seldom wait for the last of them.
     ITEMS = 4
 };

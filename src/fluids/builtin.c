@@ -2,6 +2,7 @@
 #include "fluids/builtin.h"
 
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "fluids/scene.h"
 
@@ -112,7 +113,11 @@ RfResult rf_flow_scene_moment(RfFlowScene *scene, int moment, RfFlowField *out)
             scene->moment = 0;
         }
         for (; scene->moment < moment; ++scene->moment)
+        {
+            // Between two moments, where the state is sound.
+            RF_TRY(rf_progress("running the flow", (double)scene->moment / moment));
             scene->class->advance(scene->state);
+        }
     }
     RF_TRY(rf_flow_field_create(scene->parameters.width, scene->parameters.height, out));
     RfResult result = scene->class->draw(&scene->parameters, scene->state, moment, out);

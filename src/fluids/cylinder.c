@@ -12,6 +12,7 @@
 // (Catmull-Rom). A moment shows the lattice's last whole step before it, at most a 500th of a period early. A step is
 // too short (a fifth of a millisecond) to be worth waking other threads for.
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "fluids/scene.h"
 
@@ -25,7 +26,9 @@ enum
     SHORT_SIDE = 112,
     LONG_SIDE = 8 * SHORT_SIDE,
     /// Steps before moment 0 in units of diameter over speed.
-    STARTUP = 22
+    STARTUP = 22,
+    /// A report costs as much as a hundredth of this many.
+    STEPS_A_REPORT = 8
 };
 
 // 0; right, left; down, up; then diagonals, each followed by its opposite.
@@ -195,6 +198,20 @@ static void choose_lattice(Cylinder *c, const RfParameters *parameters)
         rf_parameter(parameters, "speed") / (double)inflow * (double)c->width / (double)parameters->width;
 }
 
+/// Runs until the street sheds steadily, and keeps what stands there.
+static RfResult settle(Cylinder *c)
+{
+    int steps = (int)(STARTUP * 2 * c->radius / inflow);
+    for (int i = 0; i < steps; ++i)
+    {
+        if (i % STEPS_A_REPORT == 0)
+            RF_TRY(rf_progress("starting the vortex street", (double)i / steps));
+        step(c);
+    }
+    memcpy(c->first, c->now, DIRECTIONS * c->plane * sizeof(float));
+    return RF_OK;
+}
+
 static RfResult create(const RfParameters *parameters, void **state)
 {
     Cylinder *c = rf_allocate_zero(1, sizeof *c);
@@ -212,11 +229,12 @@ static RfResult create(const RfParameters *parameters, void **state)
         return RF_OUT_OF_MEMORY;
     }
     start(c);
-    for (int i = (int)(STARTUP * 2 * c->radius / inflow); i > 0; --i)
-        step(c);
-    memcpy(c->first, c->now, DIRECTIONS * c->plane * sizeof(float));
-    *state = c;
-    return RF_OK;
+    RfResult result = settle(c);
+    if (result == RF_OK)
+        *state = c;
+    else
+        destroy(c);
+    return result;
 }
 
 static void restart(void *state)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fluids/drawing.h"
 
-#include "core/parallel.h"
+#include "core/progress.h"
 #include "data/colour.h"
 
 enum
@@ -59,10 +59,10 @@ static void paint_row(void *context, int item, int worker)
                     canvas->image->pixels + (ptrdiff_t)item * canvas->image->row_stride + i * canvas->image->channels);
 }
 
-void rf_paint(const RfTorus *torus, const RfImageView *image, RfPaintFn *paint, const void *context)
+RfResult rf_paint(const RfTorus *torus, const RfImageView *image, RfPaintFn *paint, const void *context)
 {
     Canvas canvas = {torus, image, paint, context};
-    rf_parallel_for(image->height, paint_row, &canvas);
+    return rf_progress_for("drawing the exemplar", 0, 1, image->height, paint_row, &canvas);
 }
 
 /// Dot product of a lattice point's random direction, one of sixteen, with the way from it to the point.

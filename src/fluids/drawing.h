@@ -29,7 +29,8 @@ RfTorus rf_torus(const RfParameters *parameters);
 typedef void RfPaintFn(const void *context, float x, float y, float *colour);
 
 /// Every pixel is the mean of 2 x 2 points, averaged as linear light (channels after the third as they are).
-void rf_paint(const RfTorus *torus, const RfImageView *image, RfPaintFn *paint, const void *context);
+/// RF_CANCELLED where the progress says stop.
+RfResult rf_paint(const RfTorus *torus, const RfImageView *image, RfPaintFn *paint, const void *context);
 
 /// Gradient noise (Perlin 2002) in about -1..1, `cells` lattice cells a unit, closed on the torus.
 float rf_torus_noise(const RfTorus *torus, float x, float y, float cells, uint64_t stream);

@@ -92,7 +92,7 @@ static RfResult draw(const RfParameters *parameters, const RfImageView *image)
     RF_TRY(rf_cells_create(&bubbles.torus, 0.105f, 0.019f, 0.86f, 0, &bubbles.cells));
     RfResult result = rf_cells_create(&bubbles.torus, 0.040f, 0.018f, 0.86f, 1, &bubbles.below);
     if (result == RF_OK)
-        rf_paint(&bubbles.torus, image, paint, &bubbles);
+        result = rf_paint(&bubbles.torus, image, paint, &bubbles);
     rf_cells_destroy(bubbles.cells);
     rf_cells_destroy(bubbles.below);
     return result;

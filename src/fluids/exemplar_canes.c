@@ -212,7 +212,7 @@ static RfResult draw(const RfParameters *parameters, const RfImageView *image)
     for (int layer = 0; layer < LEAF_LAYERS && result == RF_OK; ++layer)
         result = grow_leaves(&canes, layer);
     if (result == RF_OK)
-        rf_paint(&canes.torus, image, paint, &canes);
+        result = rf_paint(&canes.torus, image, paint, &canes);
     for (int layer = 0; layer < LEAF_LAYERS; ++layer)
         rf_release(canes.leaves[layer]);
     return result;

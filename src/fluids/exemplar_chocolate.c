@@ -48,8 +48,7 @@ static void paint(const void *context, float x, float y, float *colour)
 static RfResult draw(const RfParameters *parameters, const RfImageView *image)
 {
     RfTorus torus = rf_torus(parameters);
-    rf_paint(&torus, image, paint, &torus);
-    return RF_OK;
+    return rf_paint(&torus, image, paint, &torus);
 }
 
 const RfExemplarClass rf_exemplar_chocolate = {

@@ -74,7 +74,7 @@ static RfResult draw(const RfParameters *parameters, const RfImageView *image)
     if (result == RF_OK)
         result = rf_cells_create(&foam.torus, 0.030f, 0.010f, 0.84f, 1, &foam.small_holes);
     if (result == RF_OK)
-        rf_paint(&foam.torus, image, paint, &foam);
+        result = rf_paint(&foam.torus, image, paint, &foam);
     rf_cells_destroy(foam.holes);
     rf_cells_destroy(foam.small_holes);
     return result;

@@ -94,7 +94,7 @@ static RfResult draw(const RfParameters *parameters, const RfImageView *image)
     if (result == RF_OK)
         result = rf_cells_create(&lava.torus, 0.050f, 0.025f, 0.80f, 1, &lava.shards);
     if (result == RF_OK)
-        rf_paint(&lava.torus, image, paint, &lava);
+        result = rf_paint(&lava.torus, image, paint, &lava);
     rf_cells_destroy(lava.plates);
     rf_cells_destroy(lava.shards);
     return result;

@@ -122,7 +122,7 @@ static RfResult draw(const RfParameters *parameters, const RfImageView *image)
         result =
             rf_cells_create(&pebbles.torus, layers[i].large, layers[i].small, 0.80f, (uint64_t)i, &pebbles.cells[i]);
     if (result == RF_OK)
-        rf_paint(&pebbles.torus, image, paint, &pebbles);
+        result = rf_paint(&pebbles.torus, image, paint, &pebbles);
     for (int i = 0; i < LAYERS; ++i)
         rf_cells_destroy(pebbles.cells[i]);
     return result;

@@ -6,6 +6,7 @@
 // to 3 pixels, with soft ends. It is then squeezed a little at its tails so that it stays inside 0..1 without clipping.
 #include "core/maths.h"
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/random.h"
 #include "core/result.h"
 #include "fluids/drawing.h"
@@ -46,23 +47,31 @@ static void filter(RfComplex *field, int width, int height, double scale)
         }
 }
 
-static RfResult draw_noise(const RfParameters *parameters, const RfImageView *image)
+/// White noise in space, filtered there and back.
+static RfResult make_field(const RfParameters *parameters, const RfImageView *image, RfFourier *fourier,
+                           RfComplex *field)
+{
+    static const char stage[] = "drawing the exemplar";
+    size_t width = (size_t)image->width;
+    uint64_t seed = (uint64_t)rf_parameter(parameters, "seed");
+    for (int j = 0; j < image->height; ++j)
+    {
+        if (j % 64 == 0)
+            RF_TRY(rf_progress(stage, 0.4 * j / image->height));
+        for (size_t k = (size_t)j * width; k < (size_t)(j + 1) * width; ++k)
+            field[k] = (RfComplex){normal(seed, k), 0};
+    }
+    rf_fourier_transform(fourier, field, false);
+    RF_TRY(rf_progress(stage, 0.6));
+    filter(field, image->width, image->height, rf_parameter(parameters, "scale"));
+    RF_TRY(rf_progress(stage, 0.7));
+    rf_fourier_transform(fourier, field, true);
+    return rf_progress(stage, 0.9);
+}
+
+static void show_field(const RfComplex *field, const RfImageView *image)
 {
     size_t count = (size_t)image->width * (size_t)image->height;
-    uint64_t seed = (uint64_t)rf_parameter(parameters, "seed");
-    RfFourier *fourier;
-    RF_TRY(rf_fourier_create(image->width, image->height, &fourier));
-    RfComplex *field = rf_allocate(count, sizeof *field);
-    if (!field)
-    {
-        rf_fourier_destroy(fourier);
-        return RF_OUT_OF_MEMORY;
-    }
-    for (size_t k = 0; k < count; ++k)
-        field[k] = (RfComplex){normal(seed, k), 0};
-    rf_fourier_transform(fourier, field, false);
-    filter(field, image->width, image->height, rf_parameter(parameters, "scale"));
-    rf_fourier_transform(fourier, field, true);
     double squares = 0;
     for (size_t k = 0; k < count; ++k)
         squares += (double)field[k].r * field[k].r;
@@ -73,9 +82,19 @@ static RfResult draw_noise(const RfParameters *parameters, const RfImageView *im
             float x = gain * field[(size_t)j * (size_t)image->width + (size_t)i].r;
             image->pixels[(ptrdiff_t)j * image->row_stride + i] = 0.5f + 0.5f * x / sqrtf(1 + x * x);
         }
+}
+
+static RfResult draw_noise(const RfParameters *parameters, const RfImageView *image)
+{
+    RfFourier *fourier;
+    RF_TRY(rf_fourier_create(image->width, image->height, &fourier));
+    RfComplex *field = rf_allocate((size_t)image->width * (size_t)image->height, sizeof *field);
+    RfResult result = field ? make_field(parameters, image, fourier, field) : RF_OUT_OF_MEMORY;
+    if (result == RF_OK)
+        show_field(field, image);
     rf_release(field);
     rf_fourier_destroy(fourier);
-    return RF_OK;
+    return result;
 }
 
 /// Two colours of tile, each tile its own shade, so that one can be told from the next.

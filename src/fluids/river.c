@@ -16,6 +16,7 @@
 // McCormick. A multigrid tutorial. 2000): damped Jacobi before and after, interpolation by corners and its transpose.
 // Gaps that close on a coarse grid only make that cycle a worse preconditioner; 7 steps are enough at any size tried.
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/random.h"
 #include "core/result.h"
 #include "fluids/scene.h"
@@ -26,7 +27,10 @@
 enum
 {
     ISLANDS = 7,
-    MAX_ITERATIONS = 200
+    MAX_ITERATIONS = 200,
+    /// For telling how far it is; 7 are usual.
+    USUAL_ITERATIONS = 8,
+    ROWS_A_REPORT = 32
 };
 
 typedef struct Island
@@ -60,7 +64,15 @@ struct Grid
     double *psi, *residual, *direction, *product, *diagonal, *source, *correction, *corners;
     /// NULL for the coarsest.
     Grid *coarse;
+    /// What part of the whole work is done before this grid's, and with it.
+    double from, to;
 };
+
+/// `part` of a grid's own work is done.
+static RfResult report(const Grid *grid, double part)
+{
+    return rf_progress("finding the river's flow", grid->from + (grid->to - grid->from) * part);
+}
 
 static float bank_offset(const Channel *channel, float x, int side)
 {
@@ -215,6 +227,18 @@ static void join(int *parent, int a, int b)
         parent[root_a] = root_b;
 }
 
+static void join_row(const Channel *channel, const Grid *grid, int j, int *parent)
+{
+    for (int i = 0; i < grid->width; ++i)
+        if (is_land(channel, grid, i, j))
+        {
+            int k = j * grid->columns + i;
+            join(parent, k, k + 1);
+            join(parent, k, k + grid->columns);
+            join(parent, k, k + grid->columns + 1);
+        }
+}
+
 static RfResult number_unknowns(const Channel *channel, Grid *grid)
 {
     int corners = grid->columns * grid->rows, bottom = corners - grid->columns;
@@ -223,15 +247,13 @@ static RfResult number_unknowns(const Channel *channel, Grid *grid)
         return RF_OUT_OF_MEMORY;
     for (int k = 0; k < corners; ++k)
         parent[k] = k < grid->columns ? 0 : k >= bottom ? bottom : k;
-    for (int j = 0; j < grid->height; ++j)
-        for (int i = 0; i < grid->width; ++i)
-            if (is_land(channel, grid, i, j))
-            {
-                int k = j * grid->columns + i;
-                join(parent, k, k + 1);
-                join(parent, k, k + grid->columns);
-                join(parent, k, k + grid->columns + 1);
-            }
+    RfResult result = RF_OK;
+    for (int j = 0; j < grid->height && result == RF_OK; ++j)
+    {
+        join_row(channel, grid, j, parent);
+        if (j % ROWS_A_REPORT == 0)
+            result = report(grid, 0.2 * j / grid->height);
+    }
     int bottom_root = find_root(parent, bottom);
     grid->unknown_count = 2;
     for (int k = 0; k < corners; ++k)
@@ -244,7 +266,7 @@ static RfResult number_unknowns(const Channel *channel, Grid *grid)
                                                  : grid->unknown[root];
     }
     rf_release(parent);
-    return RF_OK;
+    return result;
 }
 
 /// Friction 1 in the middle of the water and seven times that at land.
@@ -254,10 +276,13 @@ static float friction(const Channel *channel, float x, float y)
     return 1 / (0.14f + 0.86f * depth * (2 - depth));
 }
 
-static void set_edges(const Channel *channel, Grid *grid)
+static RfResult set_edges(const Channel *channel, Grid *grid)
 {
     float scale = 1 / (float)grid->height;
     for (int j = 0; j < grid->rows; ++j)
+    {
+        if (j % ROWS_A_REPORT == 0)
+            RF_TRY(report(grid, 0.2 + 0.3 * j / grid->rows));
         for (int i = 0; i < grid->columns; ++i)
         {
             size_t k = (size_t)j * (size_t)grid->columns + (size_t)i;
@@ -268,6 +293,8 @@ static void set_edges(const Channel *channel, Grid *grid)
             if (j < grid->height)
                 grid->down[k] = half * friction(channel, (float)i * scale, ((float)j + 0.5f) * scale);
         }
+    }
+    return RF_OK;
 }
 
 /// out = A x; rows of the two banks, whose psi is given, are 0. Edges within a piece of land add nothing.
@@ -409,7 +436,7 @@ static double precondition(Grid *grid)
 }
 
 /// Conjugate gradients from the psi that is there, until its error is about a millionth of the flow.
-static void solve(Grid *grid)
+static RfResult solve(Grid *grid)
 {
     size_t bytes = (size_t)grid->unknown_count * sizeof(double);
     apply(grid, grid->psi, grid->residual);
@@ -419,6 +446,7 @@ static void solve(Grid *grid)
     memcpy(grid->direction, grid->correction, bytes);
     for (int iteration = 0; iteration < MAX_ITERATIONS && weight > enough; ++iteration)
     {
+        RF_TRY(report(grid, 0.5 + 0.5 * rf_min_int(iteration, USUAL_ITERATIONS) / USUAL_ITERATIONS));
         apply(grid, grid->direction, grid->product);
         double step = weight / dot(grid, grid->direction, grid->product);
         for (int u = 2; u < grid->unknown_count; ++u)
@@ -431,6 +459,7 @@ static void solve(Grid *grid)
             grid->direction[u] = grid->correction[u] + next / weight * grid->direction[u];
         weight = next;
     }
+    return RF_OK;
 }
 
 /// First guess from the coarser grid, or, without one, a straight flow.
@@ -448,30 +477,36 @@ static void guess(Grid *grid)
 }
 
 /// Solves on a grid of this size, coarser ones first.
-static RfResult solve_grid(const Channel *channel, int width, int height, Grid **out)
+static RfResult solve_grid(const Channel *channel, int width, int height, double to, Grid **out)
 {
     Grid *grid = rf_allocate_zero(1, sizeof *grid);
     if (!grid)
         return RF_OUT_OF_MEMORY;
-    *grid = (Grid){.width = width, .height = height, .columns = width + 1, .rows = height + 1};
+    *grid = (Grid){.width = width, .height = height, .columns = width + 1, .rows = height + 1, .to = to};
     RfResult result = RF_OK;
     if (rf_min_int(width, height) >= 32)
-        result = solve_grid(channel, width / 2, height / 2, &grid->coarse);
+    {
+        // A quarter of the cells.
+        grid->from = 0.25 * to;
+        result = solve_grid(channel, width / 2, height / 2, grid->from, &grid->coarse);
+    }
     if (result == RF_OK)
         result = allocate_arrays(grid);
     if (result == RF_OK)
         result = number_unknowns(channel, grid);
-    if (result != RF_OK)
+    if (result == RF_OK)
+        result = set_edges(channel, grid);
+    if (result == RF_OK)
     {
-        free_grid(grid);
-        return result;
+        find_diagonal(grid);
+        guess(grid);
+        result = solve(grid);
     }
-    set_edges(channel, grid);
-    find_diagonal(grid);
-    guess(grid);
-    solve(grid);
-    *out = grid;
-    return RF_OK;
+    if (result == RF_OK)
+        *out = grid;
+    else
+        free_grid(grid);
+    return result;
 }
 
 /// Velocity of a cell's middle from the psi of its corners: u = -psi_y, v = psi_x with psi falling downwards.
@@ -510,7 +545,7 @@ static RfResult create(const RfParameters *parameters, void **state)
 {
     Channel channel = make_channel(parameters);
     Grid *grid;
-    RF_TRY(solve_grid(&channel, parameters->width, parameters->height, &grid));
+    RF_TRY(solve_grid(&channel, parameters->width, parameters->height, 1, &grid));
     free_grid(grid->coarse);
     grid->coarse = NULL;
     free_solver(grid);

@@ -12,6 +12,7 @@
 // A moment is drawn by putting the modes into a spectrum of the output's size: exact interpolation, free of divergence
 // at any size. Sums run in a fixed order, and the transforms do not depend on the number of threads.
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/random.h"
 #include "core/result.h"
 #include "fluids/fourier.h"
@@ -248,17 +249,22 @@ static RfResult allocate(Turbulence *t)
 }
 
 /// Runs long enough for the first vortices to roll up: half a shorter side at the greatest speed.
-static void settle(Turbulence *t, float speed)
+static RfResult settle(Turbulence *t, float speed)
 {
     float side = (float)rf_min_int(t->out_width, t->out_height);
     float cell = fminf((float)t->out_width / (float)t->width, (float)t->out_height / (float)t->height);
     float frame_step = t->time_step;
     t->time_step = 0.5f * cell / speed;
     find_losses(t);
-    for (int steps = (int)(0.7f * side / (speed * t->time_step)); steps > 0; --steps)
+    int steps = (int)(0.7f * side / (speed * t->time_step));
+    for (int i = 0; i < steps; ++i)
+    {
+        RF_TRY(rf_progress("starting the turbulence", (double)i / steps));
         step(t);
+    }
     t->time_step = frame_step;
     find_losses(t);
+    return RF_OK;
 }
 
 static RfResult create(const RfParameters *parameters, void **state)
@@ -279,7 +285,12 @@ static RfResult create(const RfParameters *parameters, void **state)
     t->steps_a_frame = rf_max_int(1, (int)ceilf(speed / (0.5f * cell)));
     t->time_step = 1 / (float)t->steps_a_frame;
     start(t, (uint64_t)rf_parameter(parameters, "seed"));
-    settle(t, speed);
+    result = settle(t, speed);
+    if (result != RF_OK)
+    {
+        destroy(t);
+        return result;
+    }
     memcpy(t->first, t->vorticity, (size_t)t->width * (size_t)t->height * sizeof *t->first);
     *state = t;
     return RF_OK;

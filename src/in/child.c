@@ -12,6 +12,7 @@
 #include "in/child.h"
 
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/result.h"
 
 #include <errno.h>
@@ -21,6 +22,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -29,7 +31,9 @@
 enum
 {
     CPU_SECONDS = 60,
-    WALL_SECONDS = 120
+    WALL_SECONDS = 120,
+    /// How often the caller is asked whether to go on.
+    POLL_MILLISECONDS = 100
 };
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -102,6 +106,9 @@ _Noreturn static void run_child(RfChildReadFn *read, const RfFlowSource *source,
         signal(deadly[i], SIG_DFL);
     // Ctrl-C is for the parent to deal with.
     signal(SIGINT, SIG_IGN);
+    // Nobody is left to read what is found, or to be told, here.
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    rf_set_progress(NULL);
     limit_child();
     RfFlowMoment content = {0};
     Reply reply;
@@ -132,18 +139,30 @@ static double now_seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-// False at the end of the pipe and when time is up.
-static bool read_all(int pipe, void *data, size_t size, double deadline)
+/// What the parent waits for, and why it no longer does.
+typedef struct Wait
+{
+    int pipe;
+    double deadline;
+    bool complete, cancelled;
+} Wait;
+
+// False at the end of the pipe, when time is up and when the caller wants no more of it.
+static bool read_all(Wait *wait, void *data, size_t size)
 {
     uint8_t *p = data;
     while (size > 0)
     {
-        double left = deadline - now_seconds();
-        struct pollfd wait = {.fd = pipe, .events = POLLIN};
-        int ready = left > 0 ? poll(&wait, 1, (int)(left * 1000) + 1) : 0;
-        if (ready < 0 && errno == EINTR)
+        double left = wait->deadline - now_seconds();
+        wait->cancelled = rf_progress("reading the flow", 0) != RF_OK;
+        if (wait->cancelled)
+            return false;
+        struct pollfd poller = {.fd = wait->pipe, .events = POLLIN};
+        int most = rf_progress_wanted() ? POLL_MILLISECONDS : WALL_SECONDS * 1000;
+        int ready = left > 0 ? poll(&poller, 1, left * 1000 < most ? (int)(left * 1000) + 1 : most) : -1;
+        if (ready == 0 || (ready < 0 && left > 0 && errno == EINTR))
             continue;
-        ssize_t got = ready > 0 ? read(pipe, p, size) : 0;
+        ssize_t got = ready > 0 ? read(wait->pipe, p, size) : 0;
         if (got < 0 && errno == EINTR)
             continue;
         if (got <= 0)
@@ -154,12 +173,12 @@ static bool read_all(int pipe, void *data, size_t size, double deadline)
     return true;
 }
 
-static RfResult receive(const RfFlowSource *source, int pipe, double deadline, bool *complete, RfFlowMoment *out)
+static RfResult receive(const RfFlowSource *source, Wait *wait, RfFlowMoment *out)
 {
     Reply reply;
-    *complete = read_all(pipe, &reply, sizeof reply, deadline);
-    if (!*complete)
-        return RF_BAD_INPUT;
+    wait->complete = read_all(wait, &reply, sizeof reply);
+    if (!wait->complete)
+        return wait->cancelled ? RF_CANCELLED : RF_BAD_INPUT;
     reply.error.place[sizeof reply.error.place - 1] = '\0';
     reply.error.message[sizeof reply.error.message - 1] = '\0';
     if (reply.result != RF_OK)
@@ -168,13 +187,15 @@ static RfResult receive(const RfFlowSource *source, int pipe, double deadline, b
     if (reply.mask)
         RF_TRY(rf_flow_field_add_mask(&out->field));
     size_t cells = (size_t)reply.width * (size_t)reply.height;
-    *complete = read_all(pipe, out->field.velocity, cells * 2 * sizeof(float), deadline) &&
-                (!reply.mask || read_all(pipe, out->field.mask, cells, deadline));
+    wait->complete = read_all(wait, out->field.velocity, cells * 2 * sizeof(float)) &&
+                     (!reply.mask || read_all(wait, out->field.mask, cells));
+    if (wait->cancelled)
+        return RF_CANCELLED;
     out->moment_count = reply.moment_count;
     out->filled_vectors = reply.filled_vectors;
     memcpy(out->conventions, reply.conventions, sizeof out->conventions);
     out->conventions[sizeof out->conventions - 1] = '\0';
-    return *complete && out->moment_count >= 1 ? RF_OK : RF_BAD_INPUT;
+    return wait->complete && out->moment_count >= 1 ? RF_OK : RF_BAD_INPUT;
 }
 
 static RfResult how_it_died(const RfFlowSource *source, const char *library, int status, bool late)
@@ -206,17 +227,16 @@ RfResult rf_child_read(RfChildReadFn *read, const char *library, const RfFlowSou
         close(ends[0]);
         return rf_fail(RF_UNREADABLE, source->path, NULL, "no process for the reader: %s", strerror(errno));
     }
-    bool complete = false;
-    double deadline = now_seconds() + WALL_SECONDS;
-    RfResult result = receive(source, ends[0], deadline, &complete, out);
+    Wait wait = {.pipe = ends[0], .deadline = now_seconds() + WALL_SECONDS};
+    RfResult result = receive(source, &wait, out);
     close(ends[0]);
-    bool late = !complete && now_seconds() >= deadline;
-    if (late)
+    bool late = !wait.complete && now_seconds() >= wait.deadline;
+    if (late || wait.cancelled)
         kill(child, SIGKILL);
     int status = 0;
     while (waitpid(child, &status, 0) < 0 && errno == EINTR)
         continue;
-    if (!complete && result == RF_BAD_INPUT)
+    if (!wait.complete && result == RF_BAD_INPUT)
         result = how_it_died(source, library, status, late);
     if (result != RF_OK)
         rf_flow_moment_free(out);

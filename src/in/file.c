@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "in/file.h"
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/result.h"
 
 #include <errno.h>
@@ -9,12 +10,18 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+// A tenth of a second of a slow disk.
+static const size_t BYTES_A_REPORT = (size_t)16 << 20;
+
 static RfResult read_all(int file, const char *path, RfBytes *out)
 {
     size_t done = 0;
     while (done < out->size)
     {
-        ssize_t got = read(file, out->data + done, out->size - done);
+        if (done > 0)
+            RF_TRY(rf_progress("reading", (double)done / (double)out->size));
+        size_t left = out->size - done;
+        ssize_t got = read(file, out->data + done, left < BYTES_A_REPORT ? left : BYTES_A_REPORT);
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0)

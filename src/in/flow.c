@@ -7,6 +7,7 @@
 #include "in/flow_format.h"
 
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "fluids/builtin.h"
 #include "in/file.h"
@@ -178,6 +179,8 @@ static RfResult load(RfFlow *flow, int moment, int keep, CachedMoment **out)
     *out = cached(flow, moment);
     if (*out)
         return RF_OK;
+    if (!flow->scene)
+        RF_TRY(rf_progress("reading the flow", 0));
     CachedMoment *slot = &flow->cache[flow->cache[0].moment == keep];
     rf_flow_moment_free(&slot->content);
     *slot = (CachedMoment){.moment = -1};

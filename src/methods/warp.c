@@ -23,6 +23,7 @@
 #include "core/memory.h"
 #include "core/options.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "core/simd.h"
 #include "data/exemplar.h"
@@ -416,6 +417,7 @@ RfResult rf_warp_create(const RfExemplar *exemplar, const RfWarpOptions *options
     *out = NULL;
     RF_TRY(rf_options_check(options, options->struct_size, sizeof *options, "rf_warp_defaults", g_options,
                             (int)(sizeof g_options / sizeof *g_options)));
+    RF_TRY(rf_progress("preparing the exemplar", 0));
     RfWarp *warp = rf_allocate_zero(1, sizeof *warp);
     if (!warp)
         return RF_OUT_OF_MEMORY;
@@ -473,6 +475,8 @@ RfResult rf_warp_advance(RfWarp *warp, const RfFlowView *flow, int width, int he
                "frame: %d x %d after frames of %d x %d: the size must stay", width, height, warp->width, warp->height);
     RF_REQUIRE(!warp->placed || flow->time >= warp->time, "flow: time %g after %g: times must not decrease", flow->time,
                warp->time);
+    // At the door: a step, once begun, is ended.
+    RF_TRY(rf_progress("warping", 0));
     if (flow->mask && !warp->nearest)
     {
         warp->nearest = rf_allocate((size_t)width * (size_t)height, sizeof(int32_t));

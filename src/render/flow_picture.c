@@ -100,14 +100,14 @@ RfFlowPictureOptions rf_flow_picture_defaults(void)
     return (RfFlowPictureOptions){.struct_size = sizeof(RfFlowPictureOptions), .seed = 1};
 }
 
-static void draw(const RfFlowCanvas *canvas, RfFlowPicture picture, RfVec2 *scratch)
+static RfResult draw(const RfFlowCanvas *canvas, RfFlowPicture picture, RfVec2 *scratch)
 {
     if (picture == RF_FLOW_LIC)
-        rf_draw_lic(canvas, scratch);
-    else
-        rf_parallel_for((canvas->height + BAND - 1) / BAND, draw_wheel_band, (void *)canvas);
+        return rf_draw_lic(canvas, scratch);
+    rf_parallel_for((canvas->height + BAND - 1) / BAND, draw_wheel_band, (void *)canvas);
     if (picture == RF_FLOW_ARROWS)
         rf_draw_arrows(canvas);
+    return RF_OK;
 }
 
 RfResult rf_flow_picture(const RfFlowView *view, const RfFlowPictureOptions *options, const RfImageView *frame)
@@ -136,7 +136,7 @@ RfResult rf_flow_picture(const RfFlowView *view, const RfFlowPictureOptions *opt
         Resampling resampling = {view, &canvas, rf_flow_blend(view, view->time)};
         rf_parallel_for((frame->height + BAND - 1) / BAND, resample_band, &resampling);
         canvas.full_speed = options->full_speed > 0 ? options->full_speed : greatest_speed(&canvas);
-        draw(&canvas, options->picture, scratch);
+        result = draw(&canvas, options->picture, scratch);
     }
     rf_release(scratch);
     rf_release(canvas.fluid);

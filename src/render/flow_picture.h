@@ -56,5 +56,5 @@ RfColour rf_flow_colour(RfVec2 velocity, float full_speed);
 
 /// Fills a canvas's frame.
 void rf_draw_arrows(const RfFlowCanvas *canvas);
-/// `scratch`: [2][height][width].
-void rf_draw_lic(const RfFlowCanvas *canvas, RfVec2 *scratch);
+/// `scratch`: [2][height][width]. Cancelled: the frame is untouched.
+RfResult rf_draw_lic(const RfFlowCanvas *canvas, RfVec2 *scratch);

@@ -10,8 +10,9 @@
 // convolution. 1997), and the wheel's colour tints the grey a little, so that direction can be read too.
 #include "render/flow_picture.h"
 
-#include "core/parallel.h"
+#include "core/progress.h"
 #include "core/random.h"
+#include "core/result.h"
 
 enum
 {
@@ -171,7 +172,7 @@ static void colour_band(void *context, int item, int worker)
         }
 }
 
-void rf_draw_lic(const RfFlowCanvas *canvas, RfVec2 *scratch)
+RfResult rf_draw_lic(const RfFlowCanvas *canvas, RfVec2 *scratch)
 {
     Lic lic = {
         .canvas = canvas, .direction = scratch, .grey = scratch + (size_t)canvas->width * (size_t)canvas->height};
@@ -181,8 +182,9 @@ void rf_draw_lic(const RfFlowCanvas *canvas, RfVec2 *scratch)
         lic.window[i] = 0.5f + 0.5f * cosf(RF_PI * (float)i / (float)lic.half_steps);
     int bands = (canvas->height + BAND - 1) / BAND;
     start(&lic);
-    rf_parallel_for(bands, convolve_band, &lic);
+    RF_TRY(rf_progress_for("drawing streamlines", 0, 0.5, bands, convolve_band, &lic));
     sharpen(&lic);
-    rf_parallel_for(bands, convolve_band, &lic);
+    RF_TRY(rf_progress_for("drawing streamlines", 0.5, 1, bands, convolve_band, &lic));
     rf_parallel_for(bands, colour_band, &lic);
+    return RF_OK;
 }

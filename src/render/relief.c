@@ -18,6 +18,7 @@
 
 #include "core/memory.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "data/colour.h"
 
@@ -410,6 +411,8 @@ typedef struct View
 {
     const Slab *slab;
     Camera camera;
+    /// [height][width] of the frame, which gets them when all are there.
+    RfColour *pixels;
 } View;
 
 static RfColour view_pixel(const View *view, int x, int y)
@@ -443,7 +446,23 @@ static void view_band(void *context, int item, int worker)
     int end = rf_min_int((item + 1) * BAND, frame->height);
     for (int y = item * BAND; y < end; ++y)
         for (int x = 0; x < frame->width; ++x)
-            rf_colour_put(frame, x, y, view_pixel(view, x, y));
+            view->pixels[(size_t)y * (size_t)frame->width + (size_t)x] = view_pixel(view, x, y);
+}
+
+static RfResult draw_view(const View *view)
+{
+    const Slab *slab = view->slab;
+    const RfImageView *frame = slab->frame;
+    int bands = (slab->height + BAND - 1) / BAND;
+    rf_parallel_for(bands, read_band, (void *)(uintptr_t)slab);
+    rf_parallel_for(slab->blocks_y, raise_ceiling, (void *)(uintptr_t)slab);
+    RF_TRY(rf_progress_for("lighting the relief", 0, 1, bands, light_band, (void *)(uintptr_t)slab));
+    bands = (frame->height + BAND - 1) / BAND;
+    RF_TRY(rf_progress_for("drawing the relief", 0, 1, bands, view_band, (void *)(uintptr_t)view));
+    for (int y = 0; y < frame->height; ++y)
+        for (int x = 0; x < frame->width; ++x)
+            rf_colour_put(frame, x, y, view->pixels[(size_t)y * (size_t)frame->width + (size_t)x]);
+    return RF_OK;
 }
 
 // ---- the call ----------------------------------------------------------------------------------------------------
@@ -478,15 +497,11 @@ RfResult rf_render_relief(const RfImageView *height, const RfImageView *colour, 
                  .colour_image = colour,
                  .frame = frame};
     slab.ceiling = rf_allocate((size_t)slab.blocks_x * (size_t)slab.blocks_y, sizeof(float));
-    RfResult result = slab.heights && slab.albedo && slab.lit && slab.ceiling ? RF_OK : RF_OUT_OF_MEMORY;
-    if (result == RF_OK)
-    {
-        rf_parallel_for((slab.height + BAND - 1) / BAND, read_band, &slab);
-        rf_parallel_for(slab.blocks_y, raise_ceiling, &slab);
-        rf_parallel_for((slab.height + BAND - 1) / BAND, light_band, &slab);
-        View view = {&slab, make_camera(&slab)};
-        rf_parallel_for((frame->height + BAND - 1) / BAND, view_band, &view);
-    }
+    View view = {&slab, make_camera(&slab),
+                 rf_allocate((size_t)frame->width * (size_t)frame->height, sizeof(RfColour))};
+    bool made = slab.heights && slab.albedo && slab.lit && slab.ceiling && view.pixels;
+    RfResult result = made ? draw_view(&view) : RF_OUT_OF_MEMORY;
+    rf_release(view.pixels);
     rf_release(slab.ceiling);
     rf_release(slab.lit);
     rf_release(slab.albedo);
