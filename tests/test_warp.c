@@ -327,9 +327,18 @@ static void absurd_speeds_give_finite_pixels(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
+static void the_table_of_options_needs_no_count(void **state)
+{
+    (void)state;
+    int count = 0;
+    assert_ptr_equal(rf_warp_option_table(NULL), rf_warp_option_table(&count));
+    assert_int_equal(count, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_table_of_options_needs_no_count),
         cmocka_unit_test(a_full_turn_in_a_rigid_rotation_comes_back),
         cmocka_unit_test(a_uniform_flow_of_whole_pixels_shifts_the_frame_and_what_flows_in_continues_the_exemplar),
         cmocka_unit_test(a_constant_exemplar_gives_a_constant_frame),
