@@ -81,7 +81,7 @@ RF_API int rf_threads(void);
 
 /// The instruction set in use: "plain", "avx2" or "avx512". The environment variable RF_SIMD picks a lower one than the
 /// machine has. Results are the same bytes for any number of threads on one instruction set; between two sets they
-/// agree within 1e-5.
+/// agree within 1e-4.
 RF_API const char *rf_simd_name(void);
 
 /// Progress of a long call. `report` gets the stage's name and the fraction of it done, 0 to 1, which does not decrease

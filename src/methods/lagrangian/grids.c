@@ -266,6 +266,9 @@ static void retire(RfLagrangian *l, int index, double time)
 float rf_lagrangian_grid_fade(const Grid *grid, double time)
 {
     float in = grid->fade_in > 0 ? rf_clamp((float)((time - grid->birth) / (double)grid->fade_in), 0, 1) : 1;
+    // The sums are normalised: beside faint others a straight line would show the newcomer at half its weight at once.
+    // There it starts as a parabola.
+    in *= grid->others + (1 - grid->others) * in;
     if (!grid->retired)
         return in;
     float out =

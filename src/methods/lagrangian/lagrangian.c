@@ -12,6 +12,7 @@
 
 #include "core/maths.h"
 #include "core/options.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "data/flow_field.h"
 
@@ -113,6 +114,7 @@ RfResult rf_lagrangian_create(const RfExemplar *exemplar, const RfLagrangianOpti
                             OPTION_COUNT));
     float radius = 0;
     RF_TRY(choose_radius(exemplar, options->particle_radius, &radius));
+    RF_TRY(rf_progress("preparing the exemplar", 0));
     RfLagrangian *l = rf_allocate_zero(1, sizeof *l);
     if (!l)
         return RF_OUT_OF_MEMORY;
@@ -190,7 +192,14 @@ static RfResult move_to(RfLagrangian *l, const RfFlowView *view, int width, int 
     double advected = now();
     RF_TRY(rf_lagrangian_grids_retire(l, flow));
     rf_lagrangian_grids_drop(l);
-    RF_TRY(rf_lagrangian_grids_refill(l, flow));
+    RfResult refilled = rf_lagrangian_grids_refill(l, flow);
+    if (refilled != RF_OK)
+    {
+        // A first step that was stopped or failed leaves the stepper as new.
+        if (!l->started)
+            l->count = 0;
+        return refilled;
+    }
     l->stats.advect_seconds = advected - start;
     l->stats.distribute_seconds = now() - advected;
     count_grids(l);
@@ -203,6 +212,7 @@ RfResult rf_lagrangian_advance(RfLagrangian *l, const RfFlowView *flow, int widt
 {
     RF_REQUIRE(l && flow, "rf_lagrangian_advance: lagrangian or flow is NULL");
     RF_TRY(check_step(l, flow, width, height));
+    RF_TRY(rf_progress("advecting", 0));
     StepFlow step;
     return move_to(l, flow, width, height, &step);
 }
@@ -215,6 +225,7 @@ RfResult rf_lagrangian_step(RfLagrangian *l, const RfFlowView *flow, const RfIma
     RF_REQUIRE(frame->channels == l->exemplar->channels, "frame: %d channels: the exemplar has %d", frame->channels,
                l->exemplar->channels);
     RF_TRY(check_step(l, flow, frame->width, frame->height));
+    RF_TRY(rf_progress("advecting", 0));
     StepFlow step;
     RF_TRY(move_to(l, flow, frame->width, frame->height, &step));
     double start = now();

@@ -56,6 +56,8 @@ typedef struct Grid
     /// In frames; fade lengths of 0 mean at once.
     double birth, retirement;
     float fade_in, fade_out;
+    /// The others' weight at the centre when the grid was born, at most 1.
+    float others;
     RfVec2 centre;
     /// Exemplar coordinates of vertex (0, 0).
     float u0, v0;

@@ -21,6 +21,7 @@
 #include "methods/lagrangian/lagrangian.h"
 
 #include "core/maths.h"
+#include "core/progress.h"
 #include "core/random.h"
 #include "core/result.h"
 #include "data/flow_field.h"
@@ -404,8 +405,11 @@ static RfResult dress(Birth *birth, const StepFlow *flow, RfArena *arena)
     float half = 0.5f * GRID_SIDE * l->radius;
     grid->u0 = birth->centre.x - half + offset.x;
     grid->v0 = birth->centre.y - half + offset.y;
-    if (l->started && weight_at_centre(birth, &patch) >= UNCOVERED)
+    float others = weight_at_centre(birth, &patch);
+    grid->others = 1;
+    if (l->started && others >= UNCOVERED)
     {
+        grid->others = rf_min(powf(others, l->options.sharpness), 1);
         grid->fade_in = rf_lagrangian_fade_length(l, grid->strain);
         grid->birth = flow->from;
     }
@@ -443,7 +447,10 @@ static RfResult dress_all(RfLagrangian *l, const StepFlow *flow, int first)
         rf_parallel_for(count, dress_one, &job);
     else
         for (int i = 0; i < count; ++i)
+        {
+            RF_TRY(rf_progress("placing grids", (double)i / count));
             dress_one(&job, i, 0);
+        }
     for (int i = 0; i < count; ++i)
         RF_TRY(job.results[i]);
     return RF_OK;
