@@ -318,6 +318,22 @@ RF_WIDE_BODY float kernel_power(float kernel, float sharpness, int power)
     return kernel > 0 ? fast_exp2(sharpness * fast_log2(rf_max(kernel, 1e-6f))) : 0;
 }
 
+// The root of x >= 0 to 5e-6 of itself: two of Newton's steps from an estimate by exponent. The machine's own takes
+// twenty cycles a vector, and this is for weights.
+RF_WIDE_BODY float fast_root(float x)
+{
+    union
+    {
+        float f;
+        int32_t i;
+    } bits = {x};
+    bits.i = 0x5f3759df - (bits.i >> 1);
+    float y = bits.f, half = 0.5f * x;
+    y *= 1.5f - half * y * y;
+    y *= 1.5f - half * y * y;
+    return x * y;
+}
+
 // w = K_p K_g K_d F over a row. `power` is a constant at every call.
 RF_WIDE_BODY void weigh_row_with(const RfDrawJob *job, const RfDrawGrid *grid, float *restrict plane, int y, Row *row,
                                  int power)
@@ -332,7 +348,7 @@ RF_WIDE_BODY void weigh_row_with(const RfDrawJob *job, const RfDrawGrid *grid, f
         for (int k = block; k < block + WIDE; ++k)
         {
             float dx = (float)k + 0.5f - cx;
-            float kernel = rf_max(1 - sqrtf(dx * dx + dy2) * inverse_radius, 0);
+            float kernel = rf_max(1 - fast_root(dx * dx + dy2) * inverse_radius, 0);
             weight[k] = kernel_power(kernel, sharpness, power) * plane[k] * fade;
             plane[k] = 0;
         }
@@ -477,8 +493,9 @@ RF_WIDE_BODY void sum_row(const RfDrawJob *job, const RfDrawGrid *grid, const Fi
     {
         w1[k] += weight[k];
         w2[k] += weight[k] * weight[k];
-        levels[k] += weight[k] * level_number;
     }
+    for (int k = row->first; k < row->end && level_number > 0; ++k)
+        levels[k] += weight[k] * level_number;
 }
 
 RF_WIDE_BODY void keep_lattice(const Row *row, int y, float *lattice)
