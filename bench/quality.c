@@ -98,95 +98,140 @@ static void add_error(MeasureFlowError *sum, MeasureFlowError e)
     sum->exemplar_floor += e.exemplar_floor;
 }
 
-int main(int argc, char **argv)
+// What a run is made of, and what it has summed up.
+typedef struct Run
 {
-    Settings s;
-    parse(argc, argv, &s);
-    RfImage *image;
+    Settings settings;
+    RfImage *image, *frame_image;
     RfExemplar *exemplar;
     RfLagrangian *lagrangian;
-    if (rf_image_read(s.exemplar, &image) != RF_OK)
-        fail(s.exemplar);
-    RfImage *frame_image;
-    RfImageView pixels = rf_image_view(image);
-    RfMapView map = {"colour", pixels.channels == 1 || pixels.channels == 3 ? RF_MAP_COLOUR : RF_MAP_DATA, pixels, 1};
-    if (rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar) != RF_OK ||
-        rf_lagrangian_create(exemplar, &s.options, &lagrangian) != RF_OK ||
-        rf_image_create(s.size, s.size, pixels.channels, &frame_image) != RF_OK)
-        fail("create");
-    rf_image_set_origin(frame_image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
-    RfImageView frame = rf_image_view(frame_image);
-    size_t n = (size_t)s.size * (size_t)s.size;
-    float *grey[2] = {malloc(n * sizeof(float)), malloc(n * sizeof(float))},
-          *displacement = malloc(2 * n * sizeof(float));
-    float *exemplar_grey = malloc((size_t)pixels.width * (size_t)pixels.height * sizeof(float));
-    measure_grey(&pixels, exemplar_grey);
-    SceneMoments scene = scene_moments(scene_two_vortices, s.size, s.size);
+    RfImageView pixels, frame;
+    SceneMoments scene;
+    float *grey[2], *displacement, *exemplar_grey;
 
-    MeasureFlowError fine = {0}, dis = {0};
-    double spectrum = 0, spectrum_floor = 0, flicker = 0, flicker_floor = 0, pop = 0, contrast = 0, histogram = 0,
-           ms = 0;
-    double layers = 0, live = 0, fading = 0, born = 0;
-    int64_t holes = 0;
-    int judged = 0;
-    for (int f = 1; f <= s.frames; ++f)
+    MeasureFlowError fine, dis;
+    double spectrum, spectrum_floor, flicker, flicker_floor, pop, contrast, histogram;
+    double ms, layers, live, fading, born;
+    int64_t holes;
+    int judged;
+} Run;
+
+static void start(Run *run)
+{
+    const Settings *s = &run->settings;
+    if (rf_image_read(s->exemplar, &run->image) != RF_OK)
+        fail(s->exemplar);
+    run->pixels = rf_image_view(run->image);
+    int channels = run->pixels.channels, size = s->size;
+    RfMapView map = {"colour", channels == 1 || channels == 3 ? RF_MAP_COLOUR : RF_MAP_DATA, run->pixels, 1};
+    if (rf_exemplar_create(&map, 1, RF_TILING_AUTO, &run->exemplar) != RF_OK ||
+        rf_lagrangian_create(run->exemplar, &s->options, &run->lagrangian) != RF_OK ||
+        rf_image_create(size, size, channels, &run->frame_image) != RF_OK)
+        fail("create");
+    rf_image_set_origin(run->frame_image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
+    run->frame = rf_image_view(run->frame_image);
+    size_t n = (size_t)size * (size_t)size;
+    run->grey[0] = malloc(n * sizeof(float));
+    run->grey[1] = malloc(n * sizeof(float));
+    run->displacement = malloc(2 * n * sizeof(float));
+    run->exemplar_grey = malloc((size_t)run->pixels.width * (size_t)run->pixels.height * sizeof(float));
+    measure_grey(&run->pixels, run->exemplar_grey);
+    run->scene = scene_moments(scene_two_vortices, size, size);
+}
+
+static void finish(Run *run)
+{
+    scene_moments_free(&run->scene);
+    rf_lagrangian_destroy(run->lagrangian);
+    rf_exemplar_destroy(run->exemplar);
+    rf_image_destroy(run->image);
+    rf_image_destroy(run->frame_image);
+    free(run->grey[0]);
+    free(run->grey[1]);
+    free(run->displacement);
+    free(run->exemplar_grey);
+}
+
+static void add_stats(Run *run, int frame)
+{
+    RfLagrangianStats stats = rf_lagrangian_stats(run->lagrangian);
+    double share = 1.0 / run->settings.frames;
+    run->holes += stats.holes;
+    run->layers += share * (double)stats.layers;
+    run->live += share * stats.live;
+    run->fading += share * stats.fading;
+    if (frame == 1)
+        return;
+    run->born += share * stats.born;
+    run->ms +=
+        1e3 * (stats.advect_seconds + stats.distribute_seconds + stats.draw_seconds) / (run->settings.frames - 1);
+}
+
+static void keep_frame(const Run *run, int frame)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%sframe.%04d.png", run->settings.out, run->settings.label, frame);
+    if (rf_image_write(path, run->frame_image) != RF_OK)
+        fail(path);
+}
+
+// The frame before is in grey[0].
+static void judge(Run *run, const RfFlowView *view)
+{
+    int size = run->settings.size, w = run->pixels.width, h = run->pixels.height;
+    const float *before = run->grey[0], *after = run->grey[1], *motion = run->displacement,
+                *exemplar = run->exemplar_grey;
+    measure_grey(&run->frame, run->grey[1]);
+    measure_displacement(view, size, size, run->displacement);
+    add_error(&run->fine, measure_flow_error(before, after, size, size, motion, NULL, exemplar, w, h));
+    add_error(&run->dis, measure_inverse_search_error(before, after, size, size, motion, NULL, exemplar, w, h));
+    MeasureSpectrum spectrum = measure_spectrum(after, size, size, exemplar, w, h);
+    MeasureFlicker flicker = measure_flicker(before, after, size, size, motion, NULL);
+    MeasureContrast contrast = measure_contrast(&run->frame, NULL, &run->pixels);
+    run->spectrum += spectrum.distance;
+    run->spectrum_floor += spectrum.floor;
+    run->flicker += flicker.whole;
+    run->flicker_floor += flicker.floor;
+    run->pop = flicker.pop > run->pop ? flicker.pop : run->pop;
+    run->contrast += contrast.luma;
+    run->histogram += contrast.histogram_mover;
+    ++run->judged;
+}
+
+static void report(const Run *run)
+{
+    const MeasureFlowError *fine = &run->fine, *dis = &run->dis;
+    double n = run->judged, spectrum_ratio = run->spectrum / run->spectrum_floor;
+    printf("%s%s,error %.3f px,x%.2f,exemplar x%.2f,dis error %.3f px,x%.2f,exemplar x%.2f,", run->settings.label,
+           run->settings.exemplar, fine->error / n, fine->error / fine->floor, fine->error / fine->exemplar_floor,
+           dis->error / n, dis->error / dis->floor, dis->error / dis->exemplar_floor);
+    printf("spectrum %.2f dB,x%.2f,product %.2f,flicker %.3f,floor %.3f,pop %.2f,contrast %.3f,histogram %.2f,",
+           run->spectrum / n, spectrum_ratio, dis->error / dis->floor * spectrum_ratio, run->flicker / n,
+           run->flicker_floor / n, run->pop, run->contrast / n, run->histogram / n);
+    printf("holes %lld,live %.0f,fading %.0f,born %.2f,layers %.2f,ms %.2f\n", (long long)run->holes, run->live,
+           run->fading, run->born, run->layers, run->ms);
+}
+
+int main(int argc, char **argv)
+{
+    static Run run;
+    parse(argc, argv, &run.settings);
+    start(&run);
+    int every = run.settings.every;
+    for (int f = 1; f <= run.settings.frames; ++f)
     {
-        RfFlowView view = scene_step(&scene, f);
-        if (rf_lagrangian_step(lagrangian, &view, &frame) != RF_OK)
+        RfFlowView view = scene_step(&run.scene, f);
+        if (rf_lagrangian_step(run.lagrangian, &view, &run.frame) != RF_OK)
             fail("step");
-        RfLagrangianStats stats = rf_lagrangian_stats(lagrangian);
-        holes += stats.holes;
-        if (f > 1)
-            ms += 1e3 * (stats.advect_seconds + stats.distribute_seconds + stats.draw_seconds) / (s.frames - 1);
-        layers += (double)stats.layers / s.frames;
-        live += (double)stats.live / s.frames;
-        fading += (double)stats.fading / s.frames;
-        born += f > 1 ? (double)stats.born / s.frames : 0;
-        if (s.out && (f - 1) % s.every == 0)
-        {
-            char path[512];
-            snprintf(path, sizeof path, "%s/%sframe.%04d.png", s.out, s.label, f);
-            if (rf_image_write(path, frame_image) != RF_OK)
-                fail(path);
-        }
-        if (f % s.every == s.every - 1)
-            measure_grey(&frame, grey[0]);
-        if (f % s.every != 0 || f < 2)
-            continue;
-        measure_grey(&frame, grey[1]);
-        measure_displacement(&view, s.size, s.size, displacement);
-        add_error(&fine, measure_flow_error(grey[0], grey[1], s.size, s.size, displacement, NULL, exemplar_grey,
-                                            pixels.width, pixels.height));
-        add_error(&dis, measure_inverse_search_error(grey[0], grey[1], s.size, s.size, displacement, NULL,
-                                                     exemplar_grey, pixels.width, pixels.height));
-        MeasureSpectrum m = measure_spectrum(grey[1], s.size, s.size, exemplar_grey, pixels.width, pixels.height);
-        MeasureFlicker k = measure_flicker(grey[0], grey[1], s.size, s.size, displacement, NULL);
-        MeasureContrast c = measure_contrast(&frame, NULL, &pixels);
-        spectrum += m.distance;
-        spectrum_floor += m.floor;
-        flicker += k.whole;
-        flicker_floor += k.floor;
-        pop = k.pop > pop ? k.pop : pop;
-        contrast += c.luma;
-        histogram += c.histogram_mover;
-        ++judged;
+        add_stats(&run, f);
+        if (run.settings.out && (f - 1) % every == 0)
+            keep_frame(&run, f);
+        if (f % every == every - 1)
+            measure_grey(&run.frame, run.grey[0]);
+        if (f % every == 0 && f > 1)
+            judge(&run, &view);
     }
-    double spectrum_ratio = spectrum / spectrum_floor;
-    printf("%s%s,error %.3f px,x%.2f,exemplar x%.2f,dis error %.3f px,x%.2f,exemplar x%.2f,spectrum %.2f dB,x%.2f,"
-           "product %.2f,flicker %.3f,floor %.3f,pop %.2f,contrast %.3f,histogram %.2f,holes %lld,"
-           "live %.0f,fading %.0f,born %.2f,layers %.2f,ms %.2f\n",
-           s.label, s.exemplar, fine.error / judged, fine.error / fine.floor, fine.error / fine.exemplar_floor,
-           dis.error / judged, dis.error / dis.floor, dis.error / dis.exemplar_floor, spectrum / judged, spectrum_ratio,
-           dis.error / dis.floor * spectrum_ratio, flicker / judged, flicker_floor / judged, pop, contrast / judged,
-           histogram / judged, (long long)holes, live, fading, born, layers, ms);
-    scene_moments_free(&scene);
-    rf_lagrangian_destroy(lagrangian);
-    rf_exemplar_destroy(exemplar);
-    rf_image_destroy(image);
-    rf_image_destroy(frame_image);
-    free(grey[0]);
-    free(grey[1]);
-    free(displacement);
-    free(exemplar_grey);
+    report(&run);
+    finish(&run);
     return 0;
 }
