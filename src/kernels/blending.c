@@ -168,11 +168,11 @@ RF_WIDE_BODY bool is_above(const Corner *p, const Corner *q)
     return p->y < q->y || (p->y == q->y && p->x < q->x);
 }
 
-// Writes `count` pixels; base and dx hold the values at the first and their slopes along x.
-RF_WIDE_BODY void write_pixels(RfTilePlanes *planes, int place, int count, Vec4 base, Vec4 dx)
+// Writes `count` pixels; u0, v0, w0 are the values at the first and dx their slopes along x.
+RF_WIDE_BODY void write_pixels(RfTilePlanes *planes, int place, int count, float u0, float v0, float w0, Vec4 dx)
 {
     float *restrict u = planes->u + place, *restrict v = planes->v + place, *restrict weight = planes->weight + place;
-    float u0 = base[0], v0 = base[1], w0 = base[2], du = dx[0], dv = dx[1], dw = dx[2];
+    float du = dx[0], dv = dx[1], dw = dx[2];
     for (int block = 0; block < count; block += WIDE)
 #pragma omp simd
         for (int k = block; k < block + WIDE; ++k)
@@ -192,19 +192,23 @@ RF_WIDE_BODY float slope_of(const Corner *p, const Corner *q)
     return q->y > p->y ? (q->x - p->x) / (q->y - p->y) : 0;
 }
 
-// Pixels of a triangle's rows: [first, end), end <= first where there are none.
+// Pixels of a triangle's rows: [first, end), end <= first where there are none; and the values there.
 typedef struct TriangleRows
 {
     int first[RF_TILE_ROWS + WIDE], end[RF_TILE_ROWS + WIDE];
+    // At the first pixel.
+    float u[RF_TILE_ROWS + WIDE], v[RF_TILE_ROWS + WIDE], weight[RF_TILE_ROWS + WIDE];
 } TriangleRows;
 
 // All rows of the triangle a, b, c (from top to bottom) at once.
-RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner *b, const Corner *c, int first_row,
-                            int end_row, Extent *extent, TriangleRows *rows)
+RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner *b, const Corner *c, Vec4 start,
+                            Vec4 dx, Vec4 dy, int first_row, int end_row, Extent *extent, TriangleRows *rows)
 {
     float slope_ac = slope_of(a, c), slope_ab = slope_of(a, b), slope_bc = slope_of(b, c);
     float ax = a->x, ay = a->y, bx = b->x, by = b->y, x0 = region->x0, x1 = region->x1;
     float cx = region->cx, cy = region->cy, radius2 = region->radius * region->radius;
+    float su = start[0], sv = start[1], sw = start[2], dxu = dx[0], dxv = dx[1], dxw = dx[2], dyu = dy[0], dyv = dy[1],
+          dyw = dy[2];
     int count = end_row - first_row;
     int *restrict least = extent->first + first_row, *restrict most = extent->end + first_row;
     for (int block = 0; block < count; block += WIDE)
@@ -220,6 +224,9 @@ RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner 
             bool some = k < count && end > first;
             rows->first[k] = first;
             rows->end[k] = end;
+            rows->u[k] = su + (float)first * dxu + (y - 0.5f) * dyu;
+            rows->v[k] = sv + (float)first * dxv + (y - 0.5f) * dyv;
+            rows->weight[k] = sw + (float)first * dxw + (y - 0.5f) * dyw;
             least[k] = some && first < least[k] ? first : least[k];
             most[k] = some && end > most[k] ? end : most[k];
         }
@@ -245,15 +252,11 @@ RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, cons
     Vec4 start = a->value + (0.5f - a->x) * dx + (0.5f - a->y) * dy;
     int first_row = (int)ceilf(rf_max(a->y, region->y0) - 0.5f), end_row = (int)ceilf(rf_min(c->y, region->y1) - 0.5f);
     TriangleRows rows;
-    find_rows(region, a, b, c, first_row, end_row, extent, &rows);
-    for (int y = first_row; y < end_row; ++y)
-    {
-        int first = rows.first[y - first_row], count = rows.end[y - first_row] - first;
-        if (count <= 0)
-            continue;
-        Vec4 base = start + (float)first * dx + (float)y * dy;
-        write_pixels(planes, y * RF_TILE_PITCH + first, count, base, dx);
-    }
+    find_rows(region, a, b, c, start, dx, dy, first_row, end_row, extent, &rows);
+    for (int k = 0; k < end_row - first_row; ++k)
+        if (rows.end[k] > rows.first[k])
+            write_pixels(planes, (first_row + k) * RF_TILE_PITCH + rows.first[k], rows.end[k] - rows.first[k],
+                         rows.u[k], rows.v[k], rows.weight[k], dx);
 }
 
 RF_WIDE_BODY void rasterise(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, Extent *extent)
