@@ -251,6 +251,8 @@ RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, cons
     Vec4 dx = (ab * acy - ac * aby) * inverse, dy = (ac * abx - ab * acx) * inverse;
     Vec4 start = a->value + (0.5f - a->x) * dx + (0.5f - a->y) * dy;
     int first_row = (int)ceilf(rf_max(a->y, region->y0) - 0.5f), end_row = (int)ceilf(rf_min(c->y, region->y1) - 0.5f);
+    if (end_row <= first_row)
+        return;
     TriangleRows rows;
     find_rows(region, a, b, c, start, dx, dy, first_row, end_row, extent, &rows);
     for (int k = 0; k < end_row - first_row; ++k)

@@ -6,7 +6,6 @@
 #include "out/image.h"
 
 #include "core/memory.h"
-#include "core/parallel.h"
 #include "core/result.h"
 #include "data/colour.h"
 
@@ -182,13 +181,6 @@ static exr_result_t compress_chunk(const ExrWriting *writing, ExrChunk *chunk)
     return code == EXR_ERR_SUCCESS ? exr_encoding_run(writing->context, 0, &chunk->pipeline) : code;
 }
 
-static void compress_item(void *context, int item, int worker)
-{
-    (void)worker;
-    ExrWriting *writing = context;
-    writing->chunks[item].code = compress_chunk(writing, &writing->chunks[item]);
-}
-
 static exr_result_t write_batch(ExrWriting *writing, int first, int count)
 {
     for (int i = 0; i < count; ++i)
@@ -200,7 +192,9 @@ static exr_result_t write_batch(ExrWriting *writing, int first, int count)
             return code;
         assert(chunk->info.height <= LINES_PER_CHUNK);
     }
-    rf_parallel_for(count, compress_item, writing);
+    // One after the other: OpenEXRCore does not promise that one context may be encoded from several threads.
+    for (int i = 0; i < count; ++i)
+        writing->chunks[i].code = compress_chunk(writing, &writing->chunks[i]);
     for (int i = 0; i < count; ++i)
     {
         const ExrChunk *chunk = &writing->chunks[i];
