@@ -593,7 +593,7 @@ static void resolved_weights_sum_to_one_their_squares_to_one_and_anything_betwee
         if (rho[k] == 1)
             assert_true(fabsf(norm[k] - sum[k]) < 1e-3f * sum[k]);
     }
-    RfResolveQuad quad = {{0.5f, 0.5f, 0.5f, 0.5f}, {0, 0, 0.4f, 0}, {1, 1, 1, 0.6f}, {0, 1, 0, 1}};
+    RfResolveQuad quad = {{0.5f, 0.5f, 0.5f, 0.5f}, {0, 0, 0.4f, 0}, {1, 1, 1, 0.6f}, {0, 1, 0, 1}, false};
     float colour[4 * COUNT], values[4 * COUNT];
     for (int k = 0; k < 4 * COUNT; ++k)
         colour[k] = 2 * rf_random_float(2, 0, (uint64_t)k, 0) - 1;

@@ -4,6 +4,9 @@
 // With pictures of equal variance v and pairwise correlation rho_ij, sum_i w_i T_i has the variance v (sum w_i^2 +
 // sum_(i != j) rho_ij w_i w_j). Dividing by the root of the bracket brings v back. Independent pictures (rho = 0) give
 // equation 3; equal ones (rho = 1) give the plain mean.
+//
+// Deviation: of a colour only the luma is blended so, and the plainly blended colour is brought to that luma. Taken
+// channel by channel the form overshoots in each by itself, and two dark greys on a warm mean come out blue.
 
 #include "kernels/resolving.h"
 #include "core/maths.h"
@@ -46,18 +49,35 @@ RF_WIDE(rf_resolve_scales,
          float *inverse_norm),
         (weight, weight2, rho, count, inverse_sum, inverse_norm))
 
+RF_WIDE_BODY float luma_of(const float *c)
+{
+    return 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
+}
+
+// How much brighter the contrast-preserving blend is than the plain one; 1 where that means nothing.
+RF_WIDE_BODY float luma_ratio(const float *colour, const float *mean, float inverse_sum, float inverse_norm)
+{
+    float middle = luma_of(mean), sum = luma_of(colour), plain = middle + sum * inverse_sum,
+          wanted = middle + sum * inverse_norm;
+    return plain > 1e-3f ? rf_min(rf_max(wanted / plain, 0), 4) : 1;
+}
+
 RF_WIDE_BODY void rf_resolve_row_body(const float *restrict colour, const float *restrict inverse_sum,
                                       const float *restrict inverse_norm, const RfResolveQuad *quad, int count,
                                       float *restrict values)
 {
     for (int k = 0; k < count; ++k)
+    {
+        float ratio = quad->colour ? luma_ratio(colour + 4 * k, quad->mean, inverse_sum[k], inverse_norm[k]) : 1;
         for (int c = 0; c < 4; ++c)
         {
-            float scale = inverse_norm[k] + quad->plain[c] * (inverse_sum[k] - inverse_norm[k]);
-            float value = quad->mean[c] + colour[4 * k + c] * scale;
+            bool plain = quad->plain[c] > 0 || (quad->colour && c < 3);
+            float value = quad->mean[c] + colour[4 * k + c] * (plain ? inverse_sum[k] : inverse_norm[k]);
+            value = quad->colour && c < 3 ? value * ratio : value;
             value = value > quad->low[c] ? value : quad->low[c];
             values[4 * k + c] = value < quad->high[c] ? value : quad->high[c];
         }
+    }
 }
 
 RF_WIDE(rf_resolve_row,
@@ -78,11 +98,10 @@ RF_WIDE_BODY void rf_resolve_rgb_body(const float *restrict colour, const float 
                                       float *restrict values)
 {
     Vec4 mean = *(const Vec4 *)quad->mean, low = *(const Vec4 *)quad->low, high = *(const Vec4 *)quad->high;
-    Vec4 plain = *(const Vec4 *)quad->plain;
     for (int k = 0; k < count; ++k)
     {
-        Vec4 value =
-            mean + *(const Vec4 *)(colour + 4 * k) * (inverse_norm[k] + plain * (inverse_sum[k] - inverse_norm[k]));
+        float ratio = luma_ratio(colour + 4 * k, quad->mean, inverse_sum[k], inverse_norm[k]);
+        Vec4 value = (mean + *(const Vec4 *)(colour + 4 * k) * inverse_sum[k]) * ratio;
         value = select4(value > low, value, low);
         value = select4(value < high, value, high);
         if (k + 1 < count)

@@ -150,8 +150,12 @@ static RfResult scratch_create(RfLagrangian *l, int worker, Scratch *out)
     return RF_OK;
 }
 
-static void fill_quads(const Material *m, RfResolveQuad *quads)
+static void fill_quads(const RfLagrangian *l, RfResolveQuad *quads)
 {
+    const Material *m = &l->material;
+    // The first map's lanes come first.
+    quads[0].colour = l->exemplar->maps[0].kind == RF_MAP_COLOUR && l->exemplar->maps[0].image.channels == 3 &&
+                      m->blend == RF_BLEND_CONTRAST && m->lane_of_channel[0] == 0;
     for (int lane = 0; lane < m->lane_count; ++lane)
     {
         RfResolveQuad *quad = &quads[lane / 4];
@@ -271,8 +275,8 @@ static bool pixel_in_fluid(const StepFlow *flow, int x, int y)
 // The common case: one colour map of three channels in quad 0, no tables to go through.
 static bool is_simple(const RfLagrangian *l)
 {
-    return l->exemplar->map_count == 1 && l->exemplar->channels == 3 && l->material.histograms[0].channels == 0 &&
-           !l->material.turned[0];
+    return l->exemplar->map_count == 1 && l->exemplar->channels == 3 && l->exemplar->maps[0].kind == RF_MAP_COLOUR &&
+           l->material.histograms[0].channels == 0 && !l->material.turned[0];
 }
 
 static int count_missing(const float *weight, int width)
@@ -295,7 +299,8 @@ static void resolve_row(const FrameJob *job, Scratch *scratch, const float *rho,
     float *out = job->frame.pixels + y * job->frame.row_stride + (ptrdiff_t)x0 * channels;
     if (is_simple(l) && !job->flow->view->mask)
     {
-        rf_resolve_rgb(scratch->sums.colour + place * 4, inverse_sum, inverse_norm, &job->quads[0], width, out);
+        rf_resolve_rgb(scratch->sums.colour + place * 4, inverse_sum,
+                       l->material.blend == RF_BLEND_PLAIN ? inverse_sum : inverse_norm, &job->quads[0], width, out);
         *holes += count_missing(weight, width);
         return;
     }
@@ -358,7 +363,7 @@ RfResult rf_lagrangian_frame_draw(RfLagrangian *l, const StepFlow *flow, const R
                     .rows = (l->height + RF_TILE_HEIGHT - 1) / RF_TILE_HEIGHT};
     int tiles = job.columns * job.rows;
     RF_TRY(bin_grids(l, &job));
-    fill_quads(&l->material, job.quads);
+    fill_quads(l, job.quads);
     job.holes = rf_arena_push(&l->arena, (size_t)tiles, sizeof *job.holes);
     job.samples = rf_arena_push(&l->arena, (size_t)tiles, sizeof *job.samples);
     if (!job.holes || !job.samples)
