@@ -47,7 +47,7 @@ format: setup-ci
 	@clang-format -i $(FORMATTED)
 
 install: all
-	@cmake --install $(BUILD)
+	@cmake --install $(BUILD) $(if $(PREFIX),--prefix $(PREFIX))
 
 clean:
 	@rm -rf $(BUILD)

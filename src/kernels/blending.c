@@ -314,15 +314,6 @@ RF_WIDE_BODY float fast_exp2(float x)
     return bits.f * (1 + t * (0.6951786f + t * (0.2276141f + t * 0.0772073f)));
 }
 
-RF_WIDE_BODY float kernel_power(float kernel, float sharpness, int power)
-{
-    if (power == 1)
-        return kernel;
-    if (power == 2)
-        return kernel * kernel;
-    return kernel > 0 ? fast_exp2(sharpness * fast_log2(rf_max(kernel, 1e-6f))) : 0;
-}
-
 // The root of x >= 0 to 5e-6 of itself: two of Newton's steps from an estimate by exponent. The machine's own takes
 // twenty cycles a vector, and this is for weights.
 RF_WIDE_BODY float fast_root(float x)
@@ -337,6 +328,18 @@ RF_WIDE_BODY float fast_root(float x)
     y *= 1.5f - half * y * y;
     y *= 1.5f - half * y * y;
     return x * y;
+}
+
+// kernel ^ sharpness; power is 1, 2, or 3 for three halves, 0 for any other.
+RF_WIDE_BODY float kernel_power(float kernel, float sharpness, int power)
+{
+    if (power == 1)
+        return kernel;
+    if (power == 2)
+        return kernel * kernel;
+    if (power == 3)
+        return kernel * sqrtf(kernel);
+    return kernel > 0 ? fast_exp2(sharpness * fast_log2(rf_max(kernel, 1e-6f))) : 0;
 }
 
 // w = K_p K_g K_d F over a row. `power` is a constant at every call.
@@ -367,6 +370,8 @@ RF_WIDE_BODY void weigh_row(const RfDrawJob *job, const RfDrawGrid *grid, float 
         weigh_row_with(job, grid, plane, y, row, 1);
     else if (job->sharpness == 2)
         weigh_row_with(job, grid, plane, y, row, 2);
+    else if (job->sharpness == 1.5f)
+        weigh_row_with(job, grid, plane, y, row, 3);
     else
         weigh_row_with(job, grid, plane, y, row, 0);
     while (row->first < row->end && !(row->weight[row->first] > (others ? NEGLIGIBLE * others[row->first] : 0)))

@@ -12,6 +12,7 @@
 #include "core/maths.h"
 #include "core/simd.h"
 
+#include <assert.h>
 #include <math.h>
 
 // 1 / sqrt(x) by three of Newton's steps from an estimate by exponent: as exact as a float holds, for a third of what
@@ -55,11 +56,11 @@ RF_WIDE_BODY float luma_of(const float *c)
 }
 
 // How much brighter the contrast-preserving blend is than the plain one; 1 where that means nothing.
-RF_WIDE_BODY float luma_ratio(const float *colour, const float *mean, float inverse_sum, float inverse_norm)
+RF_WIDE_BODY float luma_ratio(const float *colour, float middle, float inverse_sum, float inverse_norm)
 {
-    float middle = luma_of(mean), sum = luma_of(colour), plain = middle + sum * inverse_sum,
-          wanted = middle + sum * inverse_norm;
-    return plain > 1e-3f ? rf_min(rf_max(wanted / plain, 0), 4) : 1;
+    float sum = luma_of(colour), plain = middle + sum * inverse_sum, wanted = middle + sum * inverse_norm;
+    float ratio = rf_min(rf_max(wanted / rf_max(plain, 1e-3f), 0), 4);
+    return plain > 1e-3f ? ratio : 1;
 }
 
 RF_WIDE_BODY void rf_resolve_row_body(const float *restrict colour, const float *restrict inverse_sum,
@@ -68,7 +69,8 @@ RF_WIDE_BODY void rf_resolve_row_body(const float *restrict colour, const float 
 {
     for (int k = 0; k < count; ++k)
     {
-        float ratio = quad->colour ? luma_ratio(colour + 4 * k, quad->mean, inverse_sum[k], inverse_norm[k]) : 1;
+        float ratio =
+            quad->colour ? luma_ratio(colour + 4 * k, luma_of(quad->mean), inverse_sum[k], inverse_norm[k]) : 1;
         for (int c = 0; c < 4; ++c)
         {
             bool plain = quad->plain[c] > 0 || (quad->colour && c < 3);
@@ -98,10 +100,14 @@ RF_WIDE_BODY void rf_resolve_rgb_body(const float *restrict colour, const float 
                                       float *restrict values)
 {
     Vec4 mean = *(const Vec4 *)quad->mean, low = *(const Vec4 *)quad->low, high = *(const Vec4 *)quad->high;
+    float ratio[RF_TILE_COLUMNS];
+    float middle = luma_of(quad->mean);
+#pragma omp simd
+    for (int k = 0; k < count; ++k)
+        ratio[k] = luma_ratio(colour + 4 * k, middle, inverse_sum[k], inverse_norm[k]);
     for (int k = 0; k < count; ++k)
     {
-        float ratio = luma_ratio(colour + 4 * k, quad->mean, inverse_sum[k], inverse_norm[k]);
-        Vec4 value = (mean + *(const Vec4 *)(colour + 4 * k) * inverse_sum[k]) * ratio;
+        Vec4 value = (mean + *(const Vec4 *)(colour + 4 * k) * inverse_sum[k]) * ratio[k];
         value = select4(value > low, value, low);
         value = select4(value < high, value, high);
         if (k + 1 < count)
