@@ -35,26 +35,27 @@ typedef struct RfLagrangianOptions
     /// Vertices along a side of a grid, 4 to 32. Default 8. More follow fine motion; cost grows as its square.
     int grid_vertices;
 
-    /// Largest stretch or squash of a triangle before its weight is 0 (delta_max), 1.05 to 100. Smaller keeps the
-    /// spectrum, larger follows longer.
+    /// Largest stretch or squash of a triangle before its weight is 0 (delta_max), 1.05 to 100. Default 2.05. Smaller
+    /// keeps the spectrum, larger follows longer.
     float max_distortion;
 
-    /// Longest time a grid takes to fade in or out (tau), in seconds, 0 to 1000. Where the flow strains fast, fades are
-    /// shorter.
+    /// Longest time a grid takes to fade in or out (tau), in seconds, 0 to 1000. Default 5. Where the flow strains
+    /// fast, fades are shorter.
     float fade;
 
-    /// How far fades follow the local strain, 0 to 1: 0 fades everything over `fade`, 1 ends a fade when the distortion
-    /// reaches its limit.
+    /// How far fades follow the local strain, 0 to 1. Default 1. 0 fades everything over `fade`, 1 ends a fade before
+    /// the distortion reaches its limit.
     float adapt;
 
-    /// Power of the kernel weight K_p, 0.25 to 12. 1 is the paper's; larger keeps shapes by drawing one picture nearly
-    /// everywhere.
+    /// Power of the kernel weight K_p, 0.25 to 12. Default 1.5. 1 is the paper's; larger keeps shapes by drawing one
+    /// picture nearly everywhere.
     float sharpness;
 
-    /// Places in the exemplar tried for a new grid, 1 to 1000000; the one that fits best what is drawn there now is
-    /// taken. 1 takes any.
+    /// Places in the exemplar tried for a new grid, 1 to 1000000. Default 12; the one that fits best what is drawn
+    /// there now is taken. 1 takes any.
     int candidates;
 
+    /// How overlapping grids are summed. Default RF_BLEND_CONTRAST.
     RfBlend blend;
 
     /// Frames a second: turns `fade` into frames. 0.01 to 10000. Default 24.

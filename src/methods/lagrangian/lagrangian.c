@@ -39,7 +39,7 @@ static const RfOption option_table[] = {
      "for longer."},
     {"fade", RF_OPTION_FLOAT, FIELD(fade), "s", 0, 1000, 5, NULL, "Longest time a grid takes to fade in or out."},
     {"adapt", RF_OPTION_FLOAT, FIELD(adapt), "", 0, 1, 1, NULL,
-     "How far fades shorten where the flow strains: 0 not at all, 1 to end at the distortion limit."},
+     "How far fades shorten where the flow strains: 0 not at all, 1 to end before the distortion limit."},
     {"sharpness", RF_OPTION_FLOAT, FIELD(sharpness), "", 0.25, 12, 1.5, NULL,
      "Power of the kernel weight. 1 mixes several pictures everywhere, larger keeps the shapes of one."},
     {"candidates", RF_OPTION_INT, FIELD(candidates), "", 1, 1000000, 12, NULL,
