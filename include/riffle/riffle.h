@@ -6,5 +6,6 @@
 #include "data.h"
 #include "io.h"
 #include "lagrangian.h"
+#include "measure.h"
 #include "render.h"
 #include "warp.h"
