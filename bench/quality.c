@@ -10,7 +10,6 @@
 // `every`-th frame as a PNG there.
 
 #include "riffle/riffle.h"
-#include "support/measures.h"
 #include "support/scenes.h"
 
 #include <stdio.h>
@@ -90,14 +89,6 @@ static void parse(int argc, char **argv, Settings *s)
         s->options.particle_radius = (float)s->size / 8;
 }
 
-// Sums, for ratios of means.
-static void add_error(MeasureFlowError *sum, MeasureFlowError e)
-{
-    sum->error += e.error;
-    sum->floor += e.floor;
-    sum->exemplar_floor += e.exemplar_floor;
-}
-
 // What a run is made of, and what it has summed up.
 typedef struct Run
 {
@@ -107,14 +98,28 @@ typedef struct Run
     RfLagrangian *lagrangian;
     RfImageView pixels, frame;
     SceneMoments scene;
-    float *grey[2], *displacement, *exemplar_grey;
+    /// By inverse search, which also judges the rest, and by the finer estimator.
+    RfMeasure *dis, *fine;
 
-    MeasureFlowError fine, dis;
+    /// Sums, for ratios of means.
+    RfMeasureFlow dis_sum, fine_sum;
     double spectrum, spectrum_floor, flicker, flicker_floor, pop, contrast, histogram;
     double ms, layers, live, fading, born;
     int64_t holes;
     int judged;
 } Run;
+
+static RfMeasure *make_measure(const Run *run, RfMeasureEstimator estimator)
+{
+    RfMeasureOptions options = rf_measure_defaults();
+    options.estimator = estimator;
+    options.flow_every = 1;
+    options.patch_every = 0;
+    RfMeasure *measure;
+    if (rf_measure_create(&run->pixels, &options, &measure) != RF_OK)
+        fail("measure");
+    return measure;
+}
 
 static void start(Run *run)
 {
@@ -130,12 +135,8 @@ static void start(Run *run)
         fail("create");
     rf_image_set_origin(run->frame_image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
     run->frame = rf_image_view(run->frame_image);
-    size_t n = (size_t)size * (size_t)size;
-    run->grey[0] = malloc(n * sizeof(float));
-    run->grey[1] = malloc(n * sizeof(float));
-    run->displacement = malloc(2 * n * sizeof(float));
-    run->exemplar_grey = malloc((size_t)run->pixels.width * (size_t)run->pixels.height * sizeof(float));
-    measure_grey(&run->pixels, run->exemplar_grey);
+    run->dis = make_measure(run, RF_MEASURE_INVERSE_SEARCH);
+    run->fine = make_measure(run, RF_MEASURE_LUCAS_KANADE);
     run->scene = scene_moments(scene_two_vortices, size, size);
 }
 
@@ -146,10 +147,8 @@ static void finish(Run *run)
     rf_exemplar_destroy(run->exemplar);
     rf_image_destroy(run->image);
     rf_image_destroy(run->frame_image);
-    free(run->grey[0]);
-    free(run->grey[1]);
-    free(run->displacement);
-    free(run->exemplar_grey);
+    rf_measure_destroy(run->dis);
+    rf_measure_destroy(run->fine);
 }
 
 static void add_stats(Run *run, int frame)
@@ -175,32 +174,44 @@ static void keep_frame(const Run *run, int frame)
         fail(path);
 }
 
-// The frame before is in grey[0].
-static void judge(Run *run, const RfFlowView *view)
+static void add_flow(RfMeasureFlow *sum, const RfMeasureFlow *e)
 {
-    int size = run->settings.size, w = run->pixels.width, h = run->pixels.height;
-    const float *before = run->grey[0], *after = run->grey[1], *motion = run->displacement,
-                *exemplar = run->exemplar_grey;
-    measure_grey(&run->frame, run->grey[1]);
-    measure_displacement(view, size, size, run->displacement);
-    add_error(&run->fine, measure_flow_error(before, after, size, size, motion, NULL, exemplar, w, h));
-    add_error(&run->dis, measure_inverse_search_error(before, after, size, size, motion, NULL, exemplar, w, h));
-    MeasureSpectrum spectrum = measure_spectrum(after, size, size, exemplar, w, h);
-    MeasureFlicker flicker = measure_flicker(before, after, size, size, motion, NULL);
-    MeasureContrast contrast = measure_contrast(&run->frame, NULL, &run->pixels);
-    run->spectrum += spectrum.distance;
-    run->spectrum_floor += spectrum.floor;
-    run->flicker += flicker.whole;
-    run->flicker_floor += flicker.floor;
-    run->pop = flicker.pop > run->pop ? flicker.pop : run->pop;
-    run->contrast += contrast.luma;
-    run->histogram += contrast.histogram_mover;
+    sum->error += e->error;
+    sum->floor += e->floor;
+    sum->exemplar_floor += e->exemplar_floor;
+}
+
+// Without a flow: the frame only makes the next one's predecessor.
+static RfMeasureFrame look(Run *run, const RfFlowView *flow)
+{
+    RfMeasureFrame fine, dis;
+    if (rf_measure_step(run->fine, flow, NULL, &run->frame, &fine) != RF_OK ||
+        rf_measure_step(run->dis, flow, NULL, &run->frame, &dis) != RF_OK)
+        fail("measure");
+    if (flow)
+    {
+        add_flow(&run->fine_sum, &fine.flow);
+        add_flow(&run->dis_sum, &dis.flow);
+    }
+    return dis;
+}
+
+static void judge(Run *run, const RfFlowView *flow)
+{
+    RfMeasureFrame m = look(run, flow);
+    run->spectrum += m.spectrum.distance;
+    run->spectrum_floor += m.spectrum.floor;
+    run->flicker += m.flicker.whole;
+    run->flicker_floor += m.flicker.floor;
+    run->pop = m.flicker.block > run->pop ? m.flicker.block : run->pop;
+    run->contrast += m.contrast.luma;
+    run->histogram += m.contrast.histogram_mover;
     ++run->judged;
 }
 
 static void report(const Run *run)
 {
-    const MeasureFlowError *fine = &run->fine, *dis = &run->dis;
+    const RfMeasureFlow *fine = &run->fine_sum, *dis = &run->dis_sum;
     double n = run->judged, spectrum_ratio = run->spectrum / run->spectrum_floor;
     printf("%s%s,error %.3f px,x%.2f,exemplar x%.2f,dis error %.3f px,x%.2f,exemplar x%.2f,", run->settings.label,
            run->settings.exemplar, fine->error / n, fine->error / fine->floor, fine->error / fine->exemplar_floor,
@@ -226,10 +237,10 @@ int main(int argc, char **argv)
         add_stats(&run, f);
         if (run.settings.out && (f - 1) % every == 0)
             keep_frame(&run, f);
-        if (f % every == every - 1)
-            measure_grey(&run.frame, run.grey[0]);
         if (f % every == 0 && f > 1)
             judge(&run, &view);
+        else if ((f + 1) % every == 0)
+            look(&run, NULL);
     }
     report(&run);
     finish(&run);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lagrangian texture advection: what holds for its grids, its weights and its pictures in any flow.
 #include "data/flow_field.h"
+#include "measure/optical_flow.h"
 #include "methods/lagrangian/lagrangian.h"
 #include "riffle/riffle.h"
-#include "support/measures.h"
 #include "support/scenes.h"
 
 #include <setjmp.h>
@@ -295,8 +295,8 @@ static void box(int w, int h, double frame, float *velocity)
 static double greatest_change(const float *before, const float *after, const float *displacement, int n)
 {
     static float carried[MAX_PIXELS];
-    measure_invert(displacement, n, n, g_work);
-    measure_warp(before, g_work, n, n, carried);
+    assert_int_equal(rf_measure_invert(displacement, n, n, g_work), RF_OK);
+    assert_int_equal(rf_measure_warp(before, g_work, n, n, carried), RF_OK);
     double greatest = 0;
     for (int y = 4; y < n - 4; ++y)
         for (int x = 4; x < n - 4; ++x)
@@ -322,10 +322,10 @@ static void a_birth_is_not_seen(void **state)
     {
         RfFlowView view = scene_step(&moments, f);
         assert_int_equal(rf_lagrangian_step(lagrangian, &view, &frame), RF_OK);
-        measure_grey(&frame, g_grey[f % 2]);
+        rf_measure_grey(&frame, g_grey[f % 2]);
         if (f < 20)
             continue;
-        measure_displacement(&view, N, N, g_displacement);
+        rf_measure_displacement(&view, view.time - 1, N, N, g_displacement);
         double change = greatest_change(g_grey[(f + 1) % 2], g_grey[f % 2], g_displacement, N);
         bool birth = rf_lagrangian_stats(lagrangian).born > 0;
         *(birth ? &with : &without) = fmax(birth ? with : without, change);
@@ -362,9 +362,10 @@ static void in_a_uniform_flow_frames_shift_by_it_to_a_twentieth_of_a_pixel(void 
         {
             run(lagrangian, scene_translation, N, 3, f == 30 ? 1 : f, f, g_frame);
             RfImageView frame = view_of(g_frame, N, N, 3);
-            measure_grey(&frame, g_grey[f - 30]);
+            rf_measure_grey(&frame, g_grey[f - 30]);
         }
-        measure_optical_flow(g_grey[0], g_grey[1], N, N, g_work);
+        RfFramePair pair = {N, N, g_grey[0], g_grey[1], NULL, NULL};
+        assert_int_equal(rf_measure_lucas_kanade(&pair, g_work), RF_OK);
         double sum[2] = {0}, error = 0, n = 0;
         // 2 d from inflow, which is at the left and at the bottom.
         for (int y = 10; y < N - MARGIN; ++y)

@@ -2,8 +2,8 @@
 // Lagrangian texture advection at its defaults, judged on the two-vortex scene over 200 frames: does it move like the
 // flow, as far as an estimator of the class used in published work can tell, and does it still look like the exemplar.
 // Each criterion is shown to fail on inputs made to fail it. Every test prints its numbers.
+#include "measure/judgement.h"
 #include "riffle/riffle.h"
-#include "support/measures.h"
 #include "support/scenes.h"
 
 #include <math.h>
@@ -44,6 +44,7 @@ typedef struct Subject
     RfExemplar *exemplar;
     float *grey;
     int w, h;
+    RfMeasure *measure;
     Judged defaults, paper, histogram;
     // The last two frames at the defaults, and the motion between them.
     float *before, *after, *displacement;
@@ -70,28 +71,46 @@ static double contrast(const Judged *j)
 
 static double ratio_of(const float *a, const float *b, const float *displacement, const uint8_t *mask)
 {
-    return measure_inverse_search_error(a, b, N, N, displacement, mask, NULL, 0, 0).ratio;
+    RfFramePair pair = {N, N, a, b, mask, mask};
+    RfMeasureFlow flow;
+    assert_int_equal(rf_measure_flow_error(RF_MEASURE_INVERSE_SEARCH, &pair, displacement, NULL, NULL, NULL, &flow),
+                     RF_OK);
+    return flow.ratio;
+}
+
+static RfMeasure *make_measure(const Subject *s)
+{
+    RfMeasureOptions options = rf_measure_defaults();
+    options.flow_every = 1;
+    options.patch_every = 0;
+    RfImageView picture = rf_image_view(s->image);
+    RfMeasure *measure = NULL;
+    assert_int_equal(rf_measure_create(&picture, &options, &measure), RF_OK);
+    return measure;
+}
+
+// The first frame of a pair only makes the second one's predecessor.
+static void start_pair(const Subject *s, const RfImageView *frame)
+{
+    RfMeasureFrame unused;
+    assert_int_equal(rf_measure_step(s->measure, NULL, NULL, frame, &unused), RF_OK);
 }
 
 static void judge_frame(const Subject *s, const RfImageView *frame, const RfFlowView *flow, bool contrast_only,
                         Judged *j)
 {
-    RfImageView picture = rf_image_view(s->image);
-    j->contrast += measure_contrast(frame, NULL, &picture).luma;
+    RfMeasureFrame m;
+    assert_int_equal(rf_measure_step(s->measure, contrast_only ? NULL : flow, NULL, frame, &m), RF_OK);
+    j->contrast += m.contrast.luma;
     ++j->frames;
     if (contrast_only)
         return;
-    measure_displacement(flow, N, N, g_displacement);
-    MeasureFlowError e =
-        measure_inverse_search_error(g_grey[0], g_grey[1], N, N, g_displacement, NULL, s->grey, s->w, s->h);
-    MeasureSpectrum m = measure_spectrum(g_grey[1], N, N, s->grey, s->w, s->h);
-    MeasureFlicker k = measure_flicker(g_grey[0], g_grey[1], N, N, g_displacement, NULL);
-    j->error += e.error;
-    j->floor += e.floor;
-    j->exemplar_floor += e.exemplar_floor;
-    j->spectrum += m.distance;
-    j->spectrum_floor += m.floor;
-    j->flicker += k.whole;
+    j->error += m.flow.error;
+    j->floor += m.flow.floor;
+    j->exemplar_floor += m.flow.exemplar_floor;
+    j->spectrum += m.spectrum.distance;
+    j->spectrum_floor += m.spectrum.floor;
+    j->flicker += m.flicker.whole;
 }
 
 // Draws every frame where holes are counted, and else only those that are judged.
@@ -116,9 +135,14 @@ static Judged run(const Subject *s, RfLagrangianOptions options, bool every_fram
         else
             assert_int_equal(rf_lagrangian_advance(lagrangian, &flow, N, N), RF_OK);
         if (first || second)
-            measure_grey(&frame, g_grey[second]);
+            rf_measure_grey(&frame, g_grey[second]);
+        if (first)
+            start_pair(s, &frame);
         if (second)
+        {
             judge_frame(s, &frame, &flow, contrast_only, &j);
+            rf_measure_displacement(&flow, f - 1, N, N, g_displacement);
+        }
     }
     scene_moments_free(&scene);
     rf_lagrangian_destroy(lagrangian);
@@ -144,7 +168,8 @@ static void open_subject(Subject *s)
     s->h = picture.height;
     s->grey = malloc((size_t)s->w * (size_t)s->h * sizeof(float));
     assert_non_null(s->grey);
-    measure_grey(&picture, s->grey);
+    rf_measure_grey(&picture, s->grey);
+    s->measure = make_measure(s);
 }
 
 static int run_all(void **state)
@@ -172,6 +197,7 @@ static int free_all(void **state)
     for (int i = 0; i < EXEMPLARS; ++i)
     {
         Subject *s = &g_subjects[i];
+        rf_measure_destroy(s->measure);
         rf_exemplar_destroy(s->exemplar);
         rf_image_destroy(s->image);
         free(s->grey);
@@ -319,8 +345,9 @@ static double warped_spectrum_ratio(const Subject *s)
     }
     scene_moments_free(&scene);
     rf_warp_destroy(warp);
-    measure_grey(&frame, g_grey[0]);
-    return measure_spectrum(g_grey[0], N, N, s->grey, s->w, s->h).ratio;
+    RfMeasureFrame m;
+    assert_int_equal(rf_measure_step(s->measure, NULL, NULL, &frame, &m), RF_OK);
+    return m.spectrum.ratio;
 }
 
 static void a_texture_warped_for_ever_fails_the_spectrum_criterion_by_frame_200(void **state)

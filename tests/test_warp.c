@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/memory.h"
 #include "data/flow_field.h"
+#include "measure/judgement.h"
 #include "riffle/riffle.h"
-#include "support/measures.h"
 #include "support/scenes.h"
 
 #include <setjmp.h>
@@ -132,15 +132,20 @@ static void the_texture_follows_an_unsteady_flow_and_keeps_its_contrast(void **s
     run(warp, scene_two_vortices, 0, 20, g_first, g_other);
     run(warp, scene_two_vortices, 21, 21, NULL, g_last);
     RfImageView before = view_of(g_other, 3), after = view_of(g_last, 3);
-    measure_grey(&before, a);
-    measure_grey(&after, b);
+    rf_measure_grey(&before, a);
+    rf_measure_grey(&after, b);
     SceneMoments moments = scene_moments(scene_two_vortices, N, N);
     RfFlowView view = scene_step(&moments, 21);
-    measure_displacement(&view, N, N, displacement);
-    MeasureFlowError error = measure_flow_error(a, b, N, N, displacement, NULL, NULL, 0, 0);
-    MeasureFlicker flicker = measure_flicker(a, b, N, N, displacement, NULL);
+    rf_measure_displacement(&view, 20, N, N, displacement);
+    RfFramePair pair = {N, N, a, b, NULL, NULL};
+    RfMeasureFlow error;
+    RfMeasureFlicker flicker;
+    RfMeasureContrast contrast;
+    assert_int_equal(rf_measure_flow_error(RF_MEASURE_LUCAS_KANADE, &pair, displacement, NULL, NULL, NULL, &error),
+                     RF_OK);
+    assert_int_equal(rf_measure_flicker(&pair, displacement, NULL, NULL, &flicker), RF_OK);
     RfImageView map = rf_exemplar_map(exemplar, 0, NULL).image;
-    MeasureContrast contrast = measure_contrast(&after, NULL, &map);
+    rf_measure_contrast(&after, NULL, &map, &contrast);
     print_message("flow error %.4f px (floor %.4f), flicker %.3f (floor %.3f), contrast %.3f\n", error.error,
                   error.floor, flicker.whole, flicker.floor, contrast.luma);
     assert_true(error.error < 0.05 && error.ratio < 1.5);

@@ -38,7 +38,7 @@ typedef enum RfMeasureEstimator
 typedef enum RfMeasureHoles
 {
     /// Alpha where the frames have it. Otherwise a pixel whose colour channels are all exactly 0, unless the exemplar
-    /// has such a pixel too (then black is texture). A pixel that is not finite always is a hole.
+    /// has such a pixel too (then black is texture). A pixel that is not finite, or beyond +-1e6, always is a hole.
     RF_MEASURE_HOLES_AUTO,
     /// Alpha 0 and nothing else, except not finite.
     RF_MEASURE_HOLES_ALPHA,
