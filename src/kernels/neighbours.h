@@ -39,7 +39,7 @@ typedef struct RfWindowOptions
     int side;
     /// Windows wrap round the borders of every copy. Else they lie inside.
     bool tiles;
-    /// One a channel, >= 0; NULL: all 1.
+    /// One a channel, 0 to 1e4; NULL: all 1.
     const float *channel_weights;
     /// Principal components kept, up to RF_MAX_WINDOW_COMPONENTS; 0: as many as are fastest. Changes the speed, never
     /// the result.
@@ -76,8 +76,8 @@ typedef struct RfWindowQueries
     int count;
     /// [count][side][side][channels].
     const float *windows;
-    /// [count][side][side], >= 0, or NULL for all 1: how much a pixel counts; 0: not known (its numbers are not read
-    /// into the result, but must be finite). About (components + 1) : (numbers + side^2) slower than without.
+    /// [count][side][side], 0 to 1e4, or NULL for all 1: how much a pixel counts; 0: not known, its numbers are not
+    /// looked at. About (components + 1) : (numbers + side^2) slower than without.
     const float *weights;
     /// [candidates] or NULL: added to the distance when the least is looked for, not to the distance that is told. Any
     /// finite numbers within +-1e30; to spread use evenly over the exemplar.
@@ -90,7 +90,7 @@ typedef struct RfWindowQueries
 
 typedef struct RfWindowMatch
 {
-    /// -1 if there is none: everything is excluded, or the query has numbers that are not finite or beyond +-1e15.
+    /// -1 if there is none: everything is excluded, or the query has numbers that are not finite or beyond +-1e12.
     int candidate;
     RfWindowPlace place;
     /// Without the penalty; INFINITY where there is no candidate.
