@@ -3,7 +3,8 @@
 // measure, and sums up.
 //
 // Holes are counted by the coverage and by nothing else: they, and land, are filled smoothly from what is round them
-// before anything looks at the grey picture, so that they are no edges, and pixels within them do not count.
+// before anything looks at the grey picture, so that they are no edges, and pixels in them do not count. Spectra are
+// taken from crops without any, or, where every crop has some, from the filled picture.
 #include "riffle/measure.h"
 
 #include "core/maths.h"
@@ -318,6 +319,8 @@ static RfResult judge_motion(RfMeasure *m, const RfFlowView *flow, const Frame *
     return RF_OK;
 }
 
+// Crops without holes, if there are any: a filled hole is smooth, and its rim is not, which shows in the frequencies
+// that the texture does not have.
 static RfResult judge_spectrum(RfMeasure *m, const Frame *now, RfMeasureFrame *out)
 {
     RfGrey frame = {now->grey, m->width, m->height};
@@ -326,6 +329,11 @@ static RfResult judge_spectrum(RfMeasure *m, const Frame *now, RfMeasureFrame *o
     if (!m->spectrometer)
         RF_TRY(rf_spectrometer_create(m->exemplar_grey ? &exemplar : NULL, &frame, mask, m->options.spectrum_crop,
                                       m->options.spectrum_first, m->options.seed, &m->spectrometer));
+    RF_TRY(rf_spectrometer_measure(m->spectrometer, &frame, now->all_known ? NULL : now->known, &m->spectrum,
+                                   &out->spectrum));
+    bool some = out->coverage.holes > 0 && out->coverage.holes < out->coverage.fluid;
+    if (!some || !isnan(m->spectrum.power[1]))
+        return RF_OK;
     return rf_spectrometer_measure(m->spectrometer, &frame, mask, &m->spectrum, &out->spectrum);
 }
 
