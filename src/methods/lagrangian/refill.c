@@ -77,10 +77,11 @@ static RfResult patch_create(const RfLagrangian *l, RfVec2 centre, int halvings,
     const Material *m = &l->material;
     out->job = (RfDrawJob){.texture = &m->texture,
                            .sharpness = l->options.sharpness,
-                           .origin = {centre.x - 0.5f * (float)side * spacing, centre.y - 0.5f * (float)side * spacing},
-                           .spacing = spacing,
-                           .width = side,
-                           .height = side,
+                           .area = {{centre.x - 0.5f * (float)side * spacing, centre.y - 0.5f * (float)side * spacing},
+                                    spacing,
+                                    spacing,
+                                    side,
+                                    side},
                            .level_bias = halvings + 1};
     memcpy(out->job.turned, m->turned, sizeof m->turned);
     return rf_tile_create(m->texture.quads, side, arena, &out->sums);
@@ -109,7 +110,7 @@ static void draw_overlaps(const Birth *birth, Patch *patch)
 // The others' summed weight at the centre, as a weight of the linear kernel.
 static float weight_at_centre(const Birth *birth, const Patch *patch)
 {
-    int middle = patch->job.width / 2;
+    int middle = patch->job.area.width / 2;
     return powf(patch->sums.weight[middle * RF_TILE_COLUMNS + middle], 1 / birth->l->options.sharpness);
 }
 
@@ -145,13 +146,13 @@ static float mean_resemblance(const Birth *birth)
 static RfResult window_create(const Birth *birth, const Patch *patch, int halvings, RfArena *arena, RfMatchWindow *out)
 {
     const Material *m = &birth->l->material;
-    int side = patch->job.width, quads = m->texture.quads;
+    int side = patch->job.area.width, quads = m->texture.quads;
     size_t numbers = (size_t)(side * side * quads) * 4;
     float *target = rf_arena_push(arena, numbers, sizeof(float)),
           *weight = rf_arena_push(arena, numbers, sizeof(float));
     if (!target || !weight)
         return RF_OUT_OF_MEMORY;
-    float reach = KERNEL_RADIUS * birth->l->radius, spacing = patch->job.spacing;
+    float reach = KERNEL_RADIUS * birth->l->radius, spacing = patch->job.area.spacing;
     size_t k = 0;
     double energy = 0, mean_energy = 0;
     float rho = mean_resemblance(birth);
@@ -195,16 +196,16 @@ static float texel_of(float offset, float scale, float origin, float spacing)
 static RfVec2 match_offset(const RfMatchWindow *window, const Patch *patch, const RfMatch *match)
 {
     const RfTextureLevel *level = &window->texture->levels[window->level];
-    return (RfVec2){offset_of((float)match->x, level->scale_x, patch->job.origin.x, patch->job.spacing),
-                    offset_of((float)match->y, level->scale_y, patch->job.origin.y, patch->job.spacing)};
+    return (RfVec2){offset_of((float)match->x, level->scale_x, patch->job.area.origin.x, patch->job.area.spacing),
+                    offset_of((float)match->y, level->scale_y, patch->job.area.origin.y, patch->job.area.spacing)};
 }
 
 // The best of the 3 x 3 places round an offset.
 static RfMatch refine(const RfMatchWindow *window, const Patch *patch, RfVec2 offset)
 {
     const RfTextureLevel *level = &window->texture->levels[window->level];
-    int x0 = (int)lrintf(texel_of(offset.x, level->scale_x, patch->job.origin.x, patch->job.spacing));
-    int y0 = (int)lrintf(texel_of(offset.y, level->scale_y, patch->job.origin.y, patch->job.spacing));
+    int x0 = (int)lrintf(texel_of(offset.x, level->scale_x, patch->job.area.origin.x, patch->job.area.spacing));
+    int y0 = (int)lrintf(texel_of(offset.y, level->scale_y, patch->job.area.origin.y, patch->job.area.spacing));
     int places[2];
     rf_match_places(window, places);
     RfMatch best = {0, 0, INFINITY};
@@ -298,7 +299,7 @@ static RfResult choose_area(Birth *birth, const Patch *coarse, int halvings, RfA
 static float correlation(const Material *m, const Patch *mine, const Patch *other)
 {
     double cross = 0, own = 0, others = 0;
-    int side = mine->job.width;
+    int side = mine->job.area.width;
     for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x)
         {
@@ -355,7 +356,7 @@ static RfResult measure_resemblances(Birth *birth, int halvings, RfArena *arena)
         RfDrawGrid old = rf_lagrangian_draw_grid_of(l, birth->overlaps[i], l->time);
         if (!(old.fade > 0))
             continue;
-        rf_tile_clear(&other.sums, l->material.texture.quads, other.job.height);
+        rf_tile_clear(&other.sums, l->material.texture.quads, other.job.area.height);
         rf_tile_draw(&other.job, &old, &other.sums, NULL, &pixels);
         float rho = correlation(&l->material, &mine, &other);
         if (fabsf(rho) > LEAST_RESEMBLANCE)
