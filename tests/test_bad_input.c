@@ -2,8 +2,7 @@
 // Broken files and wrong command lines: each gives its exit code and one line that says what and where, and leaves
 // nothing half-written.
 #include "riffle/riffle.h"
-#include "support/command.h"
-#include "support/files.h"
+#include "support/cli_check.h"
 #include "support/flow_files.h"
 
 #include <math.h>
@@ -17,8 +16,6 @@
 #include <zlib.h>
 
 #include <cmocka.h>
-
-#define PROGRAM RF_BUILD_DIR "/riffle"
 
 typedef struct Case
 {
