@@ -2,6 +2,7 @@
 #include "flow_input.h"
 #include "errors.h"
 #include "inputs.h"
+#include "progress.h"
 
 #include <stdlib.h>
 
@@ -48,6 +49,23 @@ static int read_mask(FlowInput *input, const char *path)
                : fail(CODE_BAD_INPUT, path, NULL, "the mask is black everywhere, so there is no fluid; white is fluid");
 }
 
+/// Where the files' numbers are not the frames', someone may have meant them to be.
+static void warn_of_gaps(const FlowInput *input, const Settings *settings)
+{
+    const RfFlowInfo *info = &input->info;
+    int64_t last = info->first_frame + (int64_t)(info->moment_count - 1) * info->number_step;
+    if (info->number_step == 0)
+        warn(settings, input->path,
+             "the files' numbers have gaps, which are passed over: each file is one moment, frames %d to %d",
+             info->first_frame, info->last_frame);
+    else if (info->number_step > 1 && settings->moment_every == 1)
+        warn(settings, input->path,
+             "the files' numbers go up by %d, but each file is one moment, frames %d to %d; --moment-every %d makes "
+             "them frames %d to %lld",
+             info->number_step, info->first_frame, info->last_frame, info->number_step, info->first_frame,
+             (long long)last);
+}
+
 int flow_input_open(FlowInput *input, const Settings *settings, const char *path)
 {
     *input = (FlowInput){.path = path};
@@ -60,6 +78,7 @@ int flow_input_open(FlowInput *input, const Settings *settings, const char *path
     if (result != RF_OK)
         return fail_result(result, path);
     input->info = rf_flow_info(input->flow);
+    warn_of_gaps(input, settings);
     return settings->mask ? read_mask(input, settings->mask) : CODE_DONE;
 }
 

@@ -291,7 +291,9 @@ FLAG_SETTER(help)
 static const GenericOption g_options[] = {
     {"output", 'o', "OUTPUT", VERBS_WITH_FRAMES, "", "one more output of the same run", set_output},
     {"frames", 0, "A-B[xS]", VERBS_WITH_FRAMES, "all; 100 of a steady or built-in flow",
-     "which frames, in the input's numbers; A starts afresh, xS writes every S-th", set_frames},
+     "which frames, counted from the first file's number (a flow: moment n is frame first + n K of --moment-every); A "
+     "starts afresh, xS writes every S-th",
+     set_frames},
     {"size", 0, "WxH", VERB_TEXTURE | VERB_RENDER, "the input's cells", "output pixels, each side 1 to 32768",
      set_size},
     {"fps", 0, "F", VERBS_ALL, "24", "frames a second, 0.01 to 10000", set_fps},

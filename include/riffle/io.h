@@ -66,6 +66,9 @@ typedef struct RfFlowInfo
     /// The frame of the last moment: first_frame + (moment_count - 1) * moment_every. For steady and endless flows
     /// first_frame + 99.
     int last_frame;
+    /// What the numbers of the files go up by from one to the next, 0 where that changes. They are no times: file n is
+    /// moment n, and a missing number is passed over. 1 where there are no numbers.
+    int number_step;
     bool has_mask;
     /// Vectors marked invalid in the first moment and filled from their neighbours.
     int filled_vectors;
