@@ -320,7 +320,7 @@ static const GenericOption g_options[] = {
      "cells a frame that get full saturation or the longest arrow", set_full_speed},
     {"seed", 0, "N", VERB_TEXTURE | VERB_RENDER, "1", "same seed and inputs: same bytes", set_seed},
     {"threads", 0, "N", VERBS_ALL, "all", "1 to 256; results do not depend on it", set_threads},
-    {"resume", 0, NULL, VERBS_WITH_FRAMES, "", "continue a stopped run", set_resume},
+    {"resume", 0, NULL, VERBS_WITH_FRAMES, "", "continue a stopped run; a finished one stays as it is", set_resume},
     {"replace", 'y', NULL, VERBS_WITH_FRAMES, "refuse", "replace outputs that are there", set_replace},
     {"progress", 0, "auto|bar|plain|json|none", VERBS_WITH_FRAMES, "auto", "how progress is told on stderr",
      set_progress},

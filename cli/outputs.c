@@ -197,6 +197,28 @@ int outputs_check(Outputs *outputs, int (*number)(const void *context, int index
     return CODE_DONE;
 }
 
+static bool output_complete(const Output *output, int (*number)(const void *context, int index), const void *context,
+                            int count)
+{
+    char name[PATH_SIZE];
+    bool files = output->kind == OUTPUT_IMAGE || output->kind == OUTPUT_FLOW;
+    if (output->kind == OUTPUT_VIDEO)
+        return access(output->text, F_OK) == 0;
+    for (int i = 0; i < (output->pattern.numbered ? count : 1) && files; ++i)
+        if (!pattern_name(&output->pattern, number(context, i), NULL, NULL, name) || access(name, F_OK) != 0)
+            return false;
+    return files;
+}
+
+bool outputs_complete(const Outputs *outputs, int (*number)(const void *context, int index), const void *context,
+                      int count)
+{
+    for (int i = 0; i < outputs->count; ++i)
+        if (!output_complete(&outputs->list[i], number, context, count))
+            return false;
+    return true;
+}
+
 /// The video if it is open or could be opened. Without an encoder beside other outputs the run goes on.
 static int open_video(Outputs *outputs, Output *output, const RfImage *pixels)
 {

@@ -49,6 +49,9 @@ int outputs_open(Outputs *outputs, const Settings *settings, const char *destina
 /// Refuses what cannot work before anything is computed: one name for many frames, files that exist, inputs, folders
 /// that do not. `number(context, i)` is the i-th frame written, of `count`.
 int outputs_check(Outputs *outputs, int (*number)(const void *context, int index), const void *context, int count);
+/// True if every file of the run is there: what `--resume` finds behind a run that came to its end.
+bool outputs_complete(const Outputs *outputs, int (*number)(const void *context, int index), const void *context,
+                      int count);
 /// The first image output, NULL if there is none.
 const Output *outputs_first_image(const Outputs *outputs);
 bool outputs_have(const Outputs *outputs, OutputKind kind);

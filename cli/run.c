@@ -71,6 +71,8 @@ typedef struct Run
     /// Frames written by this run, and whether it continued another.
     int written;
     bool resumed;
+    /// --resume, and there is nothing left to do.
+    bool finished;
 } Run;
 
 static int drawn_number(const void *context, int index)
@@ -297,6 +299,10 @@ static int prepare(Run *run, int *first)
     run->state.hash = run->source->hash;
     if (run->settings->resume && run->stateful && state_exists(&run->state))
         code = resume(run, first);
+    else if (run->settings->resume && !run->outputs->replace)
+        run->finished = outputs_complete(run->outputs, drawn_number, run->plan, plan_drawn_count(run->plan));
+    if (run->finished)
+        return code;
     run->outputs->replace = run->outputs->replace || run->resumed;
     if (!code)
         code = outputs_check(run->outputs, drawn_number, run->plan, plan_drawn_count(run->plan));
@@ -369,7 +375,10 @@ int run_frames(const Settings *settings, const FramePlan *plan, const FrameSourc
     int first = 0;
     int code = prepare(run, &first);
     setup_end();
-    code = code ? code : close_run(run, run_prepared(run, first));
+    if (run->finished)
+        progress_nothing_left(settings, plan_drawn_count(plan));
+    else
+        code = code ? code : close_run(run, run_prepared(run, first));
     for (int i = 0; i < 2; ++i)
     {
         rf_image_destroy(run->slots[i].pixels);

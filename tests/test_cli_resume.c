@@ -156,6 +156,31 @@ static void another_run_is_not_resumed(void **state)
     test_folder_remove(&folder);
 }
 
+static void a_finished_run_has_nothing_left_and_stays_as_it_is(void **state)
+{
+    (void)state;
+    TestFolder folder = test_folder_make();
+    expect(&folder, TEST_TEXTURE "a.%04d.png --frames 1-3", 0);
+    // Other bytes would be made again: what is there is not looked into.
+    assert_true(test_file_write(test_folder_file(&folder, "a.0002.png"), "mine", 4));
+    expect_text(&folder, TEST_TEXTURE "a.%04d.png --frames 1-3 --resume", 0,
+                "nothing is left to do: all frames are there");
+    expect_text(&folder, TEST_TEXTURE "a.%04d.png --frames 1-3 --resume --json", 0,
+                "{\"event\":\"done\",\"frames\":0,");
+    size_t size = 0;
+    unsigned char *data = test_file_read(test_folder_file(&folder, "a.0002.png"), &size);
+    assert_int_equal(size, 4);
+    free(data);
+    assert_int_equal(test_folder_count(&folder), 3);
+    // One more frame is another run, which would replace these.
+    expect_text(&folder, TEST_TEXTURE "a.%04d.png --frames 1-4 --resume", 2, "a.0001.png: exists");
+    expect(&folder, TEST_TEXTURE "a.%04d.png --frames 1-3 --resume -y", 0);
+    data = test_file_read(test_folder_file(&folder, "a.0002.png"), &size);
+    assert_true(size > 4);
+    free(data);
+    test_folder_remove(&folder);
+}
+
 static void what_leaves_nothing_cannot_be_resumed(void **state)
 {
     (void)state;
@@ -235,6 +260,7 @@ int main(void)
         cmocka_unit_test(a_run_resumes_with_the_same_bytes_wherever_it_was_stopped),
         cmocka_unit_test(a_resumed_video_has_all_frames),
         cmocka_unit_test(another_run_is_not_resumed),
+        cmocka_unit_test(a_finished_run_has_nothing_left_and_stays_as_it_is),
         cmocka_unit_test(what_leaves_nothing_cannot_be_resumed),
         cmocka_unit_test(a_long_frame_does_not_hold_up_a_signal),
     };
