@@ -17,7 +17,7 @@ static const Verb g_verbs[] = {
      run_texture},
     {"render", VERB_RENDER, "INPUT OUTPUT", 2, false, "show a flow or a field of heights as images or video",
      "INPUT is a flow, or for --as relief images: heights from 0 to 1 (a channel named height, else the first), or\n"
-     "colours with --map height=FRAMES.\n",
+     "colours with --map height=FRAMES. A steady flow fills one name without a number (out.png), or 100 frames.\n",
      run_render},
     {"convert", VERB_CONVERT, "INPUT OUTPUT", 2, false, "between the formats of one kind of data",
      "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti.\n", run_convert},

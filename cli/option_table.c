@@ -290,7 +290,7 @@ FLAG_SETTER(help)
 
 static const GenericOption g_options[] = {
     {"output", 'o', "OUTPUT", VERBS_WITH_FRAMES, "", "one more output of the same run", set_output},
-    {"frames", 0, "A-B[xS]", VERBS_WITH_FRAMES, "all; 100 of a steady or built-in flow",
+    {"frames", 0, "A-B[xS]", VERBS_WITH_FRAMES, "all; 100 of a steady or endless flow",
      "which frames, counted from the first file's number (a flow: moment n is frame first + n K of --moment-every); A "
      "starts afresh, xS writes every S-th",
      set_frames},

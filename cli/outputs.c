@@ -121,6 +121,14 @@ bool outputs_have(const Outputs *outputs, OutputKind kind)
     return false;
 }
 
+bool outputs_hold_one(const Outputs *outputs)
+{
+    for (int i = 0; i < outputs->count; ++i)
+        if (outputs->list[i].kind != OUTPUT_IMAGE || outputs->list[i].pattern.numbered)
+            return false;
+    return true;
+}
+
 bool outputs_idle(const Outputs *outputs)
 {
     return outputs->count == 1 && outputs->list[0].kind == OUTPUT_NULL;

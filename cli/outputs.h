@@ -55,6 +55,8 @@ bool outputs_complete(const Outputs *outputs, int (*number)(const void *context,
 /// The first image output, NULL if there is none.
 const Output *outputs_first_image(const Outputs *outputs);
 bool outputs_have(const Outputs *outputs, OutputKind kind);
+/// Images alone, each of one name without a number: room for one frame.
+bool outputs_hold_one(const Outputs *outputs);
 /// Only null:, so that nothing is gained by writing while computing.
 bool outputs_idle(const Outputs *outputs);
 

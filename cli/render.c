@@ -204,6 +204,9 @@ static int render_flow(Render *render, const InputFiles *inputs, Outputs *output
         code = plan_of_flow(settings, render->flow.flow, settings->words[0], &plan);
     if (code)
         return code;
+    // A steady flow looks the same in every frame: one name takes one of them.
+    if (render->flow.info.moment_count == 1 && !settings->frames_given && outputs_hold_one(outputs))
+        plan.count = 1;
     render->width = settings->width ? settings->width : render->flow.info.width;
     render->height = settings->height ? settings->height : render->flow.info.height;
     render->picture = rf_flow_picture_defaults();

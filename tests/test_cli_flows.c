@@ -52,10 +52,27 @@ static void numbers_with_gaps_are_told_and_moment_every_makes_them_frames(void *
     test_folder_remove(&folder);
 }
 
+static void a_steady_flow_is_one_picture_where_there_is_one_name(void **state)
+{
+    (void)state;
+    TestFolder folder = test_folder_make();
+    put_flow(&folder, "one.flo", 16, 8, 1);
+    expect(&folder, "render one.flo a.png", 0);
+    expect(&folder, "render one.flo b.png -o c.exr --as lic", 0);
+    assert_int_equal(test_folder_count(&folder), 4);
+    // Numbers and unsteady flows mean frames.
+    expect(&folder, "render one.flo d.%03d.png", 0);
+    assert_int_equal(test_folder_count(&folder), 104);
+    expect_text(&folder, "render builtin:gyre?size=32x16 e.png", 2, "one name for 100 frames");
+    expect_text(&folder, "render one.flo e.png -o e.%03d.png", 2, "one name for 100 frames");
+    test_folder_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_with_gaps_are_told_and_moment_every_makes_them_frames),
+        cmocka_unit_test(a_steady_flow_is_one_picture_where_there_is_one_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
