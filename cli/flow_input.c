@@ -4,6 +4,7 @@
 #include "inputs.h"
 #include "progress.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 /// Mean over the mask's pixels that cell (i of n) covers, colours together, alpha left out.
@@ -68,7 +69,7 @@ static void warn_of_gaps(const FlowInput *input, const Settings *settings)
 
 int flow_input_open(FlowInput *input, const Settings *settings, const char *path)
 {
-    *input = (FlowInput){.path = path};
+    *input = (FlowInput){.path = path, .moment_every = settings->moment_every};
     RfFlowReadOptions options = rf_flow_read_defaults();
     options.fps = (float)settings->fps;
     options.velocity_scale = (float)settings->velocity_scale;
@@ -96,6 +97,36 @@ int flow_input_at(FlowInput *input, int frame, RfFlowView *view)
         return fail_result(result, input->path);
     if (input->mask)
         view->mask = input->mask;
+    return CODE_DONE;
+}
+
+static float greatest_in(const float *velocity, const uint8_t *mask, size_t cells)
+{
+    float square = 0;
+    for (size_t k = 0; k < cells; ++k)
+        if (!mask || mask[k])
+            square = fmaxf(square, velocity[2 * k] * velocity[2 * k] + velocity[2 * k + 1] * velocity[2 * k + 1]);
+    return sqrtf(square);
+}
+
+int flow_input_greatest(FlowInput *input, int first_frame, int last_frame, float *speed)
+{
+    *speed = 0;
+    // Between two moments velocities are means of theirs, so only moments count: one step sees two.
+    for (int64_t frame = first_frame, last = first_frame - 1; last < last_frame; frame += input->moment_every)
+    {
+        RfFlowView view;
+        last = frame < last_frame ? frame : last_frame;
+        int code = flow_input_at(input, (int)last, &view);
+        if (code)
+            return code;
+        size_t cells = (size_t)view.width * (size_t)view.height;
+        if (last == first_frame || !view.next_velocity)
+            *speed = fmaxf(*speed, greatest_in(view.velocity, view.mask, cells));
+        if (!view.next_velocity)
+            break;
+        *speed = fmaxf(*speed, greatest_in(view.next_velocity, view.mask, cells));
+    }
     return CODE_DONE;
 }
 

@@ -9,6 +9,7 @@ typedef struct FlowInput
     RfFlow *flow;
     RfFlowInfo info;
     const char *path;
+    int moment_every;
     /// [height][width]; NULL: the flow's own.
     uint8_t *mask;
     uint64_t mask_hash;
@@ -18,5 +19,7 @@ typedef struct FlowInput
 int flow_input_open(FlowInput *input, const Settings *settings, const char *path);
 void flow_input_close(FlowInput *input);
 int flow_input_at(FlowInput *input, int frame, RfFlowView *view);
+/// The greatest speed of the fluid over some frames, in cells a frame: all their moments are read (or simulated) once.
+int flow_input_greatest(FlowInput *input, int first_frame, int last_frame, float *speed);
 /// Of everything that a flow's frames depend on: options, sizes and first moment; files are in InputFiles' hash.
 int flow_input_hash(FlowInput *input, const Settings *settings, int first_frame, uint64_t *hash);

@@ -4,6 +4,8 @@
 #include "support/cli_check.h"
 #include "support/flow_files.h"
 
+#include <math.h>
+
 /// A uniform flow of u along x.
 static void put_flow(const TestFolder *folder, const char *name, int width, int height, float u)
 {
@@ -68,10 +70,45 @@ static void a_steady_flow_is_one_picture_where_there_is_one_name(void **state)
     test_folder_remove(&folder);
 }
 
+static void assert_first_pixel(const TestFolder *folder, const char *name, float r, float g, float b)
+{
+    RfImage *image = NULL;
+    assert_int_equal(rf_image_read(test_folder_file(folder, name), &image), RF_OK);
+    const float *p = rf_image_view(image).pixels;
+    if (fabsf(p[0] - r) > 0.01f || fabsf(p[1] - g) > 0.01f || fabsf(p[2] - b) > 0.01f)
+        fail_msg("%s: %g %g %g", name, (double)p[0], (double)p[1], (double)p[2]);
+    rf_image_destroy(image);
+}
+
+static void one_scale_serves_all_frames_and_the_fastest_is_not_darkened(void **state)
+{
+    (void)state;
+    TestFolder folder = test_folder_make();
+    put_flow(&folder, "s1.flo", 32, 20, 1);
+    put_flow(&folder, "s2.flo", 32, 20, 1.5f);
+    put_flow(&folder, "s3.flo", 32, 20, 4);
+    put_flow(&folder, "s4.flo", 32, 20, 2);
+    // Moments lie at frames 1, 4, 7 and 10.
+    expect(&folder, "render s%d.flo a%02d.png --moment-every 3 --size 96x60", 0);
+    assert_first_pixel(&folder, "a01.png", 1, 0.75f, 0.75f);
+    assert_first_pixel(&folder, "a07.png", 1, 0, 0);
+    assert_first_pixel(&folder, "a10.png", 1, 0.5f, 0.5f);
+    // Frame 5 needs the third moment, frame 4 does not.
+    expect(&folder, "render s%d.flo b%02d.png --moment-every 3 --frames 1-4", 0);
+    assert_first_pixel(&folder, "b04.png", 1, 0, 0);
+    expect(&folder, "render s%d.flo c%02d.png --moment-every 3 --frames 1-5", 0);
+    assert_first_pixel(&folder, "c04.png", 1, 0.625f, 0.625f);
+    expect(&folder, "render s%d.flo d%02d.png --full-speed 2", 0);
+    assert_first_pixel(&folder, "d01.png", 1, 0.5f, 0.5f);
+    assert_first_pixel(&folder, "d03.png", 0.75f, 0, 0);
+    test_folder_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_with_gaps_are_told_and_moment_every_makes_them_frames),
+        cmocka_unit_test(one_scale_serves_all_frames_and_the_fastest_is_not_darkened),
         cmocka_unit_test(a_steady_flow_is_one_picture_where_there_is_one_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
