@@ -13,7 +13,10 @@ static const Verb g_verbs[] = {
     {"texture", VERB_TEXTURE, "FLOW EXEMPLAR OUTPUT", 3, false, "texture a 2D flow",
      "Maps of the exemplar other than colour and alpha are written as OUTPUT.NAME.%04d.exr beside PNG frames, and all\n"
      "in one file where OUTPUT is EXR or NPY. A stopped run leaves .NAME.rfstate beside its first frame for "
-     "--resume.\n",
+     "--resume.\n"
+     "A map named normal holds x right, y up and z out in 0 to 1 (0.5 is 0; green is up, as in OpenGL), motion or\n"
+     "velocity two channels x right, y down: both are turned with the texture. alpha is opacity; all others are "
+     "data.\n",
      run_texture},
     {"render", VERB_RENDER, "INPUT OUTPUT", 2, false, "show a flow or a field of heights as images or video",
      "INPUT is a flow, or for --as relief images: heights from 0 to 1 (a channel named height, else the first), or\n"

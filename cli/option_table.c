@@ -311,7 +311,8 @@ static const GenericOption g_options[] = {
      set_tiling},
     {"shader", 0, "none|fire|clouds", VERB_TEXTURE, "none", "turns blended noise into fire or clouds", set_shader},
     {"uv", 0, NULL, VERB_TEXTURE, "",
-     "also write OUTPUT.uv.%04d.exr: u0 v0 weight0 id0 ... u3 v3 weight3 id3, strongest first, in exemplar pixels",
+     "also write OUTPUT.uv.%04d.exr, float: u0 v0 weight0 id0 ... u3 v3 weight3 id3, the four strongest grids of each "
+     "pixel, strongest first; u right, v down in exemplar pixels, weights of all grids add up to 1, none: 0 0 0 -1",
      set_uv},
     {"as", 0, "wheel|arrows|lic|relief", VERB_RENDER, "wheel",
      "a flow as colours, arrows or streaks; an image sequence of heights as a lit surface", set_picture},

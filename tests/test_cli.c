@@ -145,6 +145,18 @@ static void every_option_of_a_method_is_in_the_help(void **state)
     command_free(&result);
 }
 
+static void the_help_tells_what_layers_and_normals_hold(void **state)
+{
+    (void)state;
+    CommandResult result = command_run(PROGRAM, "/", "texture --help");
+    // Lines may break anywhere.
+    for (char *c = result.out; *c; ++c)
+        *c = *c == '\n' ? ' ' : *c;
+    assert_non_null(strstr(result.out, "u0 v0 weight0 id0 ... u3 v3 weight3 id3"));
+    assert_non_null(strstr(result.out, "x right, y up and z out in 0 to 1 (0.5 is 0; green is up, as in OpenGL)"));
+    command_free(&result);
+}
+
 // ---- what is refused ---------------------------------------------------------------------------------------------
 
 static void nothing_is_replaced_unless_asked(void **state)
@@ -277,6 +289,7 @@ int main(void)
         cmocka_unit_test(help_lists_the_verbs_and_others_are_refused),
         cmocka_unit_test(the_version_is_the_librarys),
         cmocka_unit_test(every_option_of_a_method_is_in_the_help),
+        cmocka_unit_test(the_help_tells_what_layers_and_normals_hold),
         cmocka_unit_test(nothing_is_replaced_unless_asked),
         cmocka_unit_test(an_input_is_never_replaced),
         cmocka_unit_test(events_are_json_a_line),
