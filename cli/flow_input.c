@@ -90,6 +90,31 @@ void flow_input_close(FlowInput *input)
     *input = (FlowInput){0};
 }
 
+void flow_input_warn_of_size(const FlowInput *input, const Settings *settings, int width, int height)
+{
+    const RfFlowInfo *info = &input->info;
+    double stretch = (double)width / info->width * info->height / height;
+    // Less than a pixel is rounding.
+    bool rounding = fabs((double)height * info->width / info->height - width) < 1;
+    if (rounding || (stretch < 1.02 && stretch > 1 / 1.02))
+        return;
+    warn(settings, input->path,
+         "%d x %d cells in frames of %d x %d pixels: all is stretched %.3g times along %s; --size %.0fx%d would not",
+         info->width, info->height, width, height, stretch > 1 ? stretch : 1 / stretch, stretch > 1 ? "x" : "y",
+         fmax(1, round((double)height * info->width / info->height)), height);
+}
+
+void flow_input_warn_of_speed(const FlowInput *input, const Settings *settings)
+{
+    const RfFlowInfo *info = &input->info;
+    double side = fmin(info->width, info->height), share = (double)info->max_speed / side;
+    if (share > 0.25)
+        warn(settings, input->path,
+             "crosses %.3g of its domain in a frame (%.4g of %.0f cells at its fastest): is it in other units? "
+             "--velocity-scale %.2g would make it 0.01",
+             share, (double)info->max_speed, side, settings->velocity_scale * 0.01 / share);
+}
+
 int flow_input_at(FlowInput *input, int frame, RfFlowView *view)
 {
     RfResult result = rf_flow_at(input->flow, frame, view);

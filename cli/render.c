@@ -209,6 +209,7 @@ static int render_flow(Render *render, const InputFiles *inputs, Outputs *output
         plan.count = 1;
     render->width = settings->width ? settings->width : render->flow.info.width;
     render->height = settings->height ? settings->height : render->flow.info.height;
+    flow_input_warn_of_size(&render->flow, settings, render->width, render->height);
     render->picture = rf_flow_picture_defaults();
     render->picture.picture = pictures[settings->picture];
     render->picture.seed = settings->seed;

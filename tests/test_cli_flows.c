@@ -104,11 +104,32 @@ static void one_scale_serves_all_frames_and_the_fastest_is_not_darkened(void **s
     test_folder_remove(&folder);
 }
 
+static void absurd_speeds_and_stretched_frames_are_warned_of(void **state)
+{
+    (void)state;
+    TestFolder folder = test_folder_make();
+    put_flow(&folder, "fast.flo", 32, 20, 5.1f);
+    put_flow(&folder, "slow.flo", 32, 20, 4.9f);
+    expect_text(&folder, "texture fast.flo builtin:foam?size=64 null: --frames 1-2", 0,
+                "fast.flo: crosses 0.255 of its domain in a frame (5.1 of 20 cells at its fastest): is it in other "
+                "units? --velocity-scale 0.039 would make it 0.01\n");
+    expect_silence(&folder, "texture slow.flo builtin:foam?size=64 null: --frames 1-2 --size 64x40");
+    // A pixel off is rounding.
+    expect_silence(&folder, "texture slow.flo builtin:foam?size=64 null: --frames 1-2 --size 11x7");
+    expect_text(&folder, "texture slow.flo builtin:foam?size=64 null: --frames 1-2 --size 70x40", 0,
+                "slow.flo: 32 x 20 cells in frames of 70 x 40 pixels: all is stretched 1.09 times along x; "
+                "--size 64x40 would not\n");
+    expect_text(&folder, "render slow.flo a.png --size 60x40 --json", 0,
+                "{\"event\":\"warning\",\"file\":\"slow.flo\"");
+    test_folder_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_with_gaps_are_told_and_moment_every_makes_them_frames),
         cmocka_unit_test(one_scale_serves_all_frames_and_the_fastest_is_not_darkened),
+        cmocka_unit_test(absurd_speeds_and_stretched_frames_are_warned_of),
         cmocka_unit_test(a_steady_flow_is_one_picture_where_there_is_one_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
