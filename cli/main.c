@@ -24,7 +24,9 @@ static const Verb g_verbs[] = {
      run_render},
     {"convert", VERB_CONVERT, "INPUT OUTPUT", 2, false, "between the formats of one kind of data",
      "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti.\n", run_convert},
-    {"info", VERB_INFO, "FILE...", 1, true, "what is in it: kind, size, channels, range, time, conventions", NULL,
+    {"info", VERB_INFO, "FILE...", 1, true, "what is in it: kind, size, channels, range, time, conventions",
+     "Of an image also: whether it tiles, and which particle radius it has room for as an exemplar; whether it can be\n"
+     "a flow.\n",
      run_info},
 };
 
