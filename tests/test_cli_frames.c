@@ -265,6 +265,28 @@ static void a_mask_makes_land(void **state)
     test_folder_remove(&folder);
 }
 
+static void a_map_of_an_unknown_name_is_plain_data_and_told_to_be(void **state)
+{
+    (void)state;
+    TestFolder folder = test_folder_make();
+    expect(&folder, "convert builtin:foam?size=64 n.png", 0);
+    expect_text(&folder, TEST_TEXTURE "null: --frames 1 --map normals=n.png", 0,
+                "warning: n.png: map normals is treated as plain data, as height, displacement, ");
+    expect_text(&folder, TEST_TEXTURE "null: --frames 1 --map motion=n.png --json", 0,
+                "\"map motion has 3 channels, not 2: it is treated as plain data and not turned\"");
+    static const char *const known[] = {"normal", "height", "alpha", "roughness", "displacement"};
+    for (int i = 0; i < 5; ++i)
+    {
+        char line[160];
+        snprintf(line, sizeof line, TEST_TEXTURE "null: --frames 1 --map %s=n.png", known[i]);
+        CommandResult result = run_in(&folder, line);
+        assert_int_equal(result.code, 0);
+        assert_null(strstr(result.err, "warning"));
+        command_free(&result);
+    }
+    test_folder_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -280,6 +302,7 @@ int main(void)
         cmocka_unit_test(samples_keep_their_depth),
         cmocka_unit_test(layers_name_places_in_the_exemplar),
         cmocka_unit_test(a_mask_makes_land),
+        cmocka_unit_test(a_map_of_an_unknown_name_is_plain_data_and_told_to_be),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
