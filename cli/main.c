@@ -23,7 +23,10 @@ static const Verb g_verbs[] = {
      "colours with --map height=FRAMES. A steady flow fills one name without a number (out.png), or 100 frames.\n",
      run_render},
     {"convert", VERB_CONVERT, "INPUT OUTPUT", 2, false, "between the formats of one kind of data",
-     "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti.\n", run_convert},
+     "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti, a file a moment where the name "
+     "has\n"
+     "a number in it; out.npy takes all moments as [T, H, W, 2].\n",
+     run_convert},
     {"info", VERB_INFO, "FILE...", 1, true, "what is in it: kind, size, channels, range, time, conventions",
      "Of an image also: whether it tiles, and which particle radius it has room for as an exemplar; whether it can be\n"
      "a flow.\n",

@@ -292,11 +292,14 @@ static int replay(Run *run, int first)
 static int prepare(Run *run, int *first)
 {
     char name[PATH_SIZE];
+    int code = outputs_gather(run->outputs, plan_drawn_count(run->plan));
     const Output *image = outputs_first_image(run->outputs);
-    int code = CODE_DONE;
-    if (image && pattern_name(&image->pattern, plan_number(run->plan, 0), NULL, NULL, name))
+    if (image && !outputs_have(run->outputs, OUTPUT_ARRAY) &&
+        pattern_name(&image->pattern, plan_number(run->plan, 0), NULL, NULL, name))
         run->stateful = state_place(&run->state, name);
     run->state.hash = run->source->hash;
+    if (code)
+        return code;
     if (run->settings->resume && run->stateful && state_exists(&run->state))
         code = resume(run, first);
     else if (run->settings->resume && !run->outputs->replace)

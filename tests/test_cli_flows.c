@@ -124,12 +124,37 @@ static void absurd_speeds_and_stretched_frames_are_warned_of(void **state)
     test_folder_remove(&folder);
 }
 
+static void many_moments_become_one_array_or_a_file_each(void **state)
+{
+    (void)state;
+    TestFolder folder = test_folder_make();
+    expect(&folder, "convert builtin:gyre?size=32x16 a.npy -o n%02d.npy -o f%02d.flo --frames 1-7x3", 0);
+    assert_int_equal(test_folder_count(&folder), 1 + 3 + 3);
+    CommandResult result = run_in(&folder, "info a.npy n04.npy");
+    assert_non_null(strstr(result.out, "a.npy: 2D flow (npy), 32 x 16 cells, 3 moments, frames 0 to 2"));
+    assert_non_null(strstr(result.out, "n04.npy: 2D flow (npy), 32 x 16 cells, steady"));
+    command_free(&result);
+    expect(&folder, "convert a.npy g%02d.flo", 0);
+    assert_same_file(&folder, "f01.flo", &folder, "g00.flo");
+    assert_same_file(&folder, "f07.flo", &folder, "g02.flo");
+    expect_text(&folder, "convert builtin:gyre?size=32x16 a.npy --frames 1-3", 2, "a.npy: exists");
+    expect_text(&folder, "convert builtin:gyre?size=32x16 b.npy --frames 1-3 --resume", 2, "cannot be resumed");
+    expect_text(&folder, "convert builtin:gyre?size=32x16 b.flo --frames 1-3", 2, "one name for 3 frames");
+    // What ends before its time leaves nothing.
+    assert_true(test_file_write(test_folder_file(&folder, "f07.flo"), "PIEH", 4));
+    expect(&folder, "convert f%02d.flo b.npy", 3);
+    assert_false(exists(&folder, "b.npy"));
+    assert_int_equal(test_folder_count(&folder), 10);
+    test_folder_remove(&folder);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_with_gaps_are_told_and_moment_every_makes_them_frames),
         cmocka_unit_test(one_scale_serves_all_frames_and_the_fastest_is_not_darkened),
         cmocka_unit_test(absurd_speeds_and_stretched_frames_are_warned_of),
+        cmocka_unit_test(many_moments_become_one_array_or_a_file_each),
         cmocka_unit_test(a_steady_flow_is_one_picture_where_there_is_one_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -95,6 +95,16 @@ RF_API RF_MUST_USE RfResult rf_flow_at(RfFlow *flow, int frame, RfFlowView *out)
 /// zero velocity marks the land.
 RF_API RF_MUST_USE RfResult rf_flow_write(const char *path, const RfFlowView *view, float fps);
 
+/// Several moments of one size being written to one .npy ([T, H, W, 2]), in the order of time.
+typedef struct RfFlowArray RfFlowArray;
+
+RF_API RF_MUST_USE RfResult rf_flow_array_open(const char *path, int width, int height, int moments, RfFlowArray **out);
+/// Land is written as zero velocity.
+RF_API RF_MUST_USE RfResult rf_flow_array_write(RfFlowArray *array, const RfFlowView *view);
+/// Finishes and renames the file once all moments are there; on failure, and when `keep` is false, nothing stays. Frees
+/// the array in every case; accepts NULL.
+RF_API RfResult rf_flow_array_close(RfFlowArray *array, bool keep);
+
 // ---- built-in inputs ---------------------------------------------------------------------------------------------
 
 typedef struct RfBuiltin
