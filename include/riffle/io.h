@@ -72,7 +72,7 @@ typedef struct RfFlowInfo
     bool has_mask;
     /// Vectors marked invalid in the first moment and filled from their neighbours.
     int filled_vectors;
-    /// Greatest and mean speed of the first moment, in cells a frame after all scaling.
+    /// Greatest and mean speed of the first moment's fluid, in cells a frame after all scaling; land does not count.
     float max_speed, mean_speed;
     /// "flo", "npy", "nc", "builtin", ...
     char format[16];
