@@ -379,3 +379,31 @@ MeasureFlicker measure_flicker(const float *a, const float *b, int w, int h, con
                             .pop_x = step.block_x,
                             .pop_y = step.block_y};
 }
+
+void measure_block_changes(const float *a, const float *b, int w, int h, const float *displacement, const uint8_t *mask,
+                           int block, float *changes)
+{
+    size_t count = (size_t)w * (size_t)h;
+    float *backward = floats(2 * count), *carried = floats(count);
+    measure_invert(displacement, w, h, backward);
+    uint8_t *counted = counted_pixels(w, h, mask, backward);
+    measure_warp(a, backward, w, h, carried);
+    int columns = w / block, rows = h / block;
+    for (int k = 0; k < columns * rows; ++k)
+    {
+        double sum = 0;
+        int n = 0;
+        for (int i = 0; i < block * block; ++i)
+        {
+            size_t place =
+                (size_t)(k / columns * block + i / block) * (size_t)w + (size_t)(k % columns * block + i % block);
+            double difference = (double)(b[place] - carried[place]);
+            sum += counted[place] ? difference * difference : 0;
+            n += counted[place];
+        }
+        changes[k] = 2 * n >= block * block ? (float)sqrt(sum / n) : -1;
+    }
+    rf_release(counted);
+    rf_release(carried);
+    rf_release(backward);
+}

@@ -105,3 +105,8 @@ typedef struct MeasureFlicker
 
 MeasureFlicker measure_flicker(const float *a, const float *b, int w, int h, const float *displacement,
                                const uint8_t *mask);
+
+/// Rms difference between b and a carried by the flow in each block of `block` x `block` pixels, in grey levels: [h /
+/// block][w / block], row by row; -1 where less than half of a block counts. What pops stands out from the rest.
+void measure_block_changes(const float *a, const float *b, int w, int h, const float *displacement, const uint8_t *mask,
+                           int block, float *changes);

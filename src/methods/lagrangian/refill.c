@@ -40,8 +40,9 @@ enum
     AREA_STREAM = 1 << 30
 };
 
-// Weights of others under this (to the power of the sharpness) count as none: the new grid is needed at once.
-#define UNCOVERED 0.02f
+// Weights of others under this count as none. A new grid has it at least to start from, so that it shows at once where
+// it is alone, and where it is not comes in beside the faintest.
+#define UNCOVERED 1e-3f
 // Resemblances under this are not worth a place.
 #define LEAST_RESEMBLANCE 0.03f
 
@@ -107,11 +108,11 @@ static void draw_overlaps(const Birth *birth, Patch *patch)
     }
 }
 
-// The others' summed weight at the centre, as a weight of the linear kernel.
-static float weight_at_centre(const Birth *birth, const Patch *patch)
+// The others' summed weight at the centre.
+static float weight_at_centre(const Patch *patch)
 {
     int middle = patch->job.area.width / 2;
-    return powf(patch->sums.weight[middle * RF_TILE_COLUMNS + middle], 1 / birth->l->options.sharpness);
+    return patch->sums.weight[middle * RF_TILE_COLUMNS + middle];
 }
 
 static float resemblance_of(const RfLagrangian *l, int a, int b)
@@ -406,12 +407,12 @@ static RfResult dress(Birth *birth, const StepFlow *flow, RfArena *arena)
     float half = 0.5f * GRID_SIDE * l->radius;
     grid->u0 = birth->centre.x - half + offset.x;
     grid->v0 = birth->centre.y - half + offset.y;
-    float others = weight_at_centre(birth, &patch);
     grid->others = 1;
-    if (l->started && others >= UNCOVERED)
+    if (l->started)
     {
-        grid->others = rf_min(powf(others, l->options.sharpness), 1);
-        grid->fade_in = rf_lagrangian_fade_length(l, grid->strain);
+        float others = weight_at_centre(&patch);
+        grid->others = rf_clamp(others, UNCOVERED, 1);
+        grid->fade_in = rf_lagrangian_fade_length(l, grid->strain, others > UNCOVERED ? grid->others : 0);
         grid->birth = flow->from;
     }
     if (l->options.candidates > 1 && l->options.blend != RF_BLEND_PLAIN)
