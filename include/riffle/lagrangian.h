@@ -27,15 +27,15 @@ typedef struct RfLagrangianOptions
     /// Same seed and same input: same bytes, with any number of threads. Default 1.
     uint64_t seed;
 
-    /// Poisson-disk radius d, in output pixels, 2 to 4096; 0 picks 64, or less where the exemplar is small. Smaller
-    /// follows the flow closer and blends more; cost grows as 1 / d^2. An exemplar that does not tile must measure 3.9
-    /// d; a larger d is refused with the one that fits.
+    /// Poisson-disk radius d, in output pixels, 2 to 4096; 0 picks 64, or less where the exemplar's shorter side is
+    /// under 3.9 d, or 2.6 d if it tiles. Smaller follows the flow closer and blends more; cost grows as 1 / d^2. An
+    /// exemplar that does not tile must measure 3.9 d; a larger d is refused with the one that fits.
     float particle_radius;
 
     /// Vertices along a side of a grid, 4 to 32. Default 8. More follow fine motion; cost grows as its square.
     int grid_vertices;
 
-    /// Largest stretch or squash of a triangle before its weight is 0 (delta_max), 1.05 to 100. Default 2.05. Smaller
+    /// Largest stretch or squash of a triangle before its weight is 0 (delta_max), 1.05 to 100. Default 1.95. Smaller
     /// keeps the spectrum, larger follows longer.
     float max_distortion;
 
