@@ -79,14 +79,14 @@ void rf_tile_products(const float *queries, const float *candidates, int numbers
     CHOOSE(tile_products)(queries, candidates, numbers, start, out, stride);
 }
 
-void rf_fold_group(const float *bounds, float *minima)
+void rf_fold_group(const float *bounds, ptrdiff_t bounds_stride, int queries, float *minima, ptrdiff_t minima_stride)
 {
-    CHOOSE(fold_group)(bounds, minima);
+    CHOOSE(fold_group)(bounds, bounds_stride, queries, minima, minima_stride);
 }
 
-void rf_find_least(const float *minima, int count, RfLeast *least)
+int rf_find_least(const float *bounds, const float *minima, int count, float *value)
 {
-    CHOOSE(find_least)(minima, count, least);
+    return CHOOSE(find_least)(bounds, minima, count, value);
 }
 
 int rf_list_below(const float *bounds, const float *minima, int count, float limit, int *list)
@@ -131,20 +131,26 @@ static inline Vec4 weighted_square(const float *a, const float *b, const float *
 
 float rf_window_distance(RfWindowRows a, RfWindowRows b, RfWindowRows weights, int rows, int count)
 {
-    Vec4 even = {0, 0, 0, 0}, odd = {0, 0, 0, 0};
+    // Four chains of sums: an addition takes as long as four can be begun in.
+    Vec4 even[2] = {{0}}, odd[2] = {{0}};
     for (int j = 0; j < rows; ++j)
     {
         const float *p = a.numbers + j * a.stride, *q = b.numbers + j * b.stride,
                     *w = weights.numbers + j * weights.stride;
+        Vec4 first = even[0], second = odd[0];
         int i = 0;
         for (; i + 8 <= count; i += 8)
         {
-            even += weighted_square(p + i, q + i, w + i);
-            odd += weighted_square(p + i + 4, q + i + 4, w + i + 4);
+            first += weighted_square(p + i, q + i, w + i);
+            second += weighted_square(p + i + 4, q + i + 4, w + i + 4);
         }
         if (i < count)
-            even += weighted_square(p + i, q + i, w + i);
+            first += weighted_square(p + i, q + i, w + i);
+        even[0] = even[1];
+        odd[0] = odd[1];
+        even[1] = first;
+        odd[1] = second;
     }
-    even += odd;
-    return (even[0] + even[1]) + (even[2] + even[3]);
+    Vec4 sum = (even[0] + even[1]) + (odd[0] + odd[1]);
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }

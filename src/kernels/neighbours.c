@@ -105,33 +105,52 @@ static size_t row_room(const RfWindowDatabase *d)
     return (size_t)d->side * (size_t)d->row_numbers;
 }
 
-// Copies a query to rows that are padded with 0; numbers of weight 0 become 0.
+static bool all_in_range(const float *numbers, int count)
+{
+    int outside = 0;
+    for (int k = 0; k < count; ++k)
+        outside += !(fabsf(numbers[k]) <= RF_WINDOW_LARGEST);
+    return outside == 0;
+}
+
+// Rows are padded with 0. (A call of memcpy takes longer than these few numbers.)
+static void copy_row(const float *row, int count, int padded, float *out)
+{
+    int i = 0;
+    for (; i + 4 <= count; i += 4)
+        memcpy(out + i, row + i, 4 * sizeof *out);
+    for (; i < padded; ++i)
+        out[i] = i < count ? row[i] : 0;
+}
+
+// Numbers of weight 0 become 0.
+static void mask_row(const RfWindowDatabase *d, const float *mask, float *row, float *weights)
+{
+    for (int i = 0; i < d->row_numbers; ++i)
+    {
+        float weight = i < d->side * d->channels ? mask[i / d->channels] : 0;
+        weights[i] = weight * d->row_weights[i];
+        row[i] = weight > 0 ? row[i] : 0;
+    }
+}
+
+// Returns whether all numbers that count are in range.
 static bool copy_query(const Search *search, int index, float *rows, float *weights)
 {
     const RfWindowDatabase *d = search->database;
-    const float *window = search->queries->windows + (size_t)index * (size_t)d->numbers,
-                *mask = search->masked ? search->queries->weights + (size_t)index * (size_t)d->side * (size_t)d->side
-                                       : NULL;
     int row = d->side * d->channels;
-    bool valid = true;
-    for (int j = 0; j < d->side; ++j, rows += d->row_numbers, window += row)
-    {
-        memcpy(rows, window, (size_t)row * sizeof *rows);
-        for (int i = row; i < d->row_numbers; ++i)
-            rows[i] = 0;
-        for (int i = 0; mask && i < d->row_numbers; ++i)
-        {
-            float weight = i < row ? mask[j * d->side + i / d->channels] : 0;
-            weights[j * d->row_numbers + i] = weight * d->row_weights[i];
-            rows[i] = weight > 0 ? rows[i] : 0;
-        }
-        for (int i = 0; i < row; ++i)
-            valid &= fabsf(rows[i]) <= RF_WINDOW_LARGEST;
-    }
-    return valid;
+    const float *window = search->queries->windows + (size_t)index * (size_t)d->numbers;
+    for (int j = 0; j < d->side; ++j)
+        copy_row(window + j * row, row, d->row_numbers, rows + j * d->row_numbers);
+    if (!search->masked)
+        return all_in_range(window, d->numbers);
+    const float *mask = search->queries->weights + (size_t)index * (size_t)d->side * (size_t)d->side;
+    for (int j = 0; j < d->side; ++j)
+        mask_row(d, mask + j * d->side, rows + j * d->row_numbers, weights + j * d->row_numbers);
+    return all_in_range(rows, d->side * d->row_numbers);
 }
 
-// -m s^2 q and m / 2: see the top. `panel` holds s q; sums[q] becomes sum m s^2 q^2.
+// m s^2 q and m / 2: see the top. `panel` holds s q; sums[q] becomes sum m s^2 q^2.
 static void mask_panel(const Search *search, int first, int count, const float *panel, float *kept, float *sums)
 {
     const RfWindowDatabase *d = search->database;
@@ -146,22 +165,12 @@ static void mask_panel(const Search *search, int first, int count, const float *
         for (int k = 0; k < d->numbers; ++k)
         {
             float number = panel[k * RF_TILE_QUERIES + q], weight = mask[k / d->channels];
-            kept[k * RF_TILE_QUERIES + q] = -weight * number;
+            kept[k * RF_TILE_QUERIES + q] = weight * number;
             sums[q] += weight * number * number;
         }
         for (int p = 0; p < pixels; ++p)
             halves[p * RF_TILE_QUERIES + q] = 0.5f * mask[p];
     }
-}
-
-static void keep_queries(const RfWindowDatabase *d, const float *panel, const float *products,
-                         const RfPanelNorms *norms, float *kept)
-{
-    for (int k = 0; k < d->kept; ++k)
-        for (int q = 0; q < RF_TILE_QUERIES; ++q)
-            kept[k * RF_TILE_QUERIES + q] = d->complete          ? -panel[k * RF_TILE_QUERIES + q]
-                                            : k == d->components ? -norms->residual[q]
-                                                                 : -products[q * d->blocks * RF_BASIS_BLOCK + k];
 }
 
 static float most_weight(const Search *search, int index)
@@ -198,9 +207,7 @@ static void load_panel(const Search *search, Worker *worker, int panel_index, in
     }
     else
     {
-        rf_project_panel(worker->panel, d->numbers, d->basis, d->blocks, worker->products);
-        rf_measure_panel(d, worker->panel, worker->products, &norms);
-        keep_queries(d, worker->panel, worker->products, &norms, kept);
+        rf_keep_panel(d, worker->panel, worker->products, kept, &norms);
     }
     float rounding = rf_rounding_of(d->numbers + search->kept);
     for (int q = 0; q < count; ++q)
@@ -216,7 +223,8 @@ static void load_panel(const Search *search, Worker *worker, int panel_index, in
 
 // ---- bounds ------------------------------------------------------------------------------------------------------
 
-// A tile for masked queries: numbers [numbers][32], then their squares, summed over a pixel's channels, [pixels][32].
+// A tile for masked queries: negative numbers [numbers][32], then their squares, summed over a pixel's channels,
+// [pixels][32].
 static void gather_tile(const Search *search, int first, Worker *worker)
 {
     const RfWindowDatabase *d = search->database;
@@ -233,7 +241,7 @@ static void gather_tile(const Search *search, int first, Worker *worker)
             for (int q = 0; q < count; ++q)
             {
                 float number = worker->panel[k * RF_TILE_QUERIES + q];
-                worker->tile[k * RF_TILE_CANDIDATES + part + q] = number;
+                worker->tile[k * RF_TILE_CANDIDATES + part + q] = -number;
                 squares[k / d->channels * RF_TILE_CANDIDATES + part + q] += number * number;
             }
     }
@@ -260,13 +268,13 @@ static void fill_bounds(const Search *search, Worker *worker, int panels, int fi
                                  worker->bounds + (size_t)p * RF_TILE_QUERIES * search->bounds_stride + c,
                                  (ptrdiff_t)search->bounds_stride);
         }
-        for (int q = 0; q < panels * RF_TILE_QUERIES; ++q)
-        {
-            float *bounds = worker->bounds + (size_t)q * search->bounds_stride + group;
+        int queries = panels * RF_TILE_QUERIES;
+        float *bounds = worker->bounds + group;
+        for (int q = 0; q < queries && end - group < RF_GROUP_CANDIDATES; ++q)
             for (int c = end - group; c < RF_GROUP_CANDIDATES; ++c)
-                bounds[c] = INFINITY;
-            rf_fold_group(bounds, worker->minima + (size_t)q * search->minima_stride + group / FOLD);
-        }
+                bounds[(size_t)q * search->bounds_stride + (size_t)c] = INFINITY;
+        rf_fold_group(bounds, (ptrdiff_t)search->bounds_stride, queries, worker->minima + group / FOLD,
+                      (ptrdiff_t)search->minima_stride);
     }
 }
 
@@ -277,7 +285,7 @@ static void exclude(const Search *search, RfWindowPlace place, int first, int co
     rf_window_centre(d, place, &exclusion.x, &exclusion.y);
     rf_exclude_bounds(&exclusion, d->centre_x + first, d->centre_y + first, count, bounds);
     for (int group = 0; group < count; group += RF_GROUP_CANDIDATES)
-        rf_fold_group(bounds + group, minima + group / FOLD);
+        rf_fold_group(bounds + group, 0, 1, minima + group / FOLD, 0);
 }
 
 // ---- full comparisons --------------------------------------------------------------------------------------------
@@ -309,14 +317,11 @@ static void compare(const Search *search, Query *query, int candidate)
 static void visit_chunk(const Search *search, Worker *worker, Query *query, const float *bounds, const float *minima,
                         int first, int count)
 {
-    RfLeast least;
     int folded = (count + RF_GROUP_CANDIDATES - 1) / RF_GROUP_CANDIDATES * RF_GROUP_LANES;
-    rf_find_least(minima, folded, &least);
-    if (least.value == INFINITY || least.value > query->limit)
+    float least;
+    int nearest = rf_find_least(bounds, minima, folded, &least);
+    if (least == INFINITY || least > query->limit)
         return;
-    int nearest = least.index / RF_GROUP_LANES * RF_GROUP_CANDIDATES + least.index % RF_GROUP_LANES;
-    while (bounds[nearest] != least.value)
-        nearest += RF_GROUP_LANES;
     compare(search, query, first + nearest);
     int listed = rf_list_below(bounds, minima, folded, query->limit, worker->list);
     for (int i = 0; i < listed; ++i)
