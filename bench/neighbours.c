@@ -2,7 +2,7 @@
 // How fast is an exact search for nearest windows? CSV on stdout: case,size,threads,stage,ms (median of n runs),n,
 // floor of 32 numbers ms,floor of all numbers ms,GFLOP/s (of the floor of 32: what the whole search amounts to).
 //
-//   bench_neighbours [runs=7] [case=TEXT] [components=N]
+//   bench_neighbours [runs=7] [case=TEXT] [components=N] [picture=FILE]
 //
 // The floors are measured in the same run, one of each after every search: the bare blocked comparison of as many
 // queries and candidates of 32 numbers, or of all a window has, the minimum kept in registers, and nothing else: no
@@ -308,13 +308,15 @@ static void run(const Case *test, const char *kind, const Picture *exemplar, int
 
 int main(int argc, char **argv)
 {
-    const char *only = "";
+    const char *only = "", *picture = NULL;
     for (int i = 1; i < argc; ++i)
     {
         if (strncmp(argv[i], "runs=", 5) == 0)
             g_runs = atoi(argv[i] + 5);
         if (strncmp(argv[i], "case=", 5) == 0)
             only = argv[i] + 5;
+        if (strncmp(argv[i], "picture=", 8) == 0)
+            picture = argv[i] + 8;
         if (strncmp(argv[i], "components=", 11) == 0)
             g_components = atoi(argv[i] + 11);
     }
@@ -328,14 +330,15 @@ int main(int argc, char **argv)
     printf("case,size,threads,stage,ms,runs,floor of 32 ms,floor of all ms,GFLOP/s\n");
     for (size_t i = 0; i < sizeof cases / sizeof cases[0] * 8; ++i)
     {
-        const Case *test = &cases[i / 8];
+        Case test = cases[i / 8];
+        test.picture = picture ? picture : test.picture;
         const char *kind = kinds[i / 2 % 4];
         char label[64];
         snprintf(label, sizeof label, "%zu%s%zu", i / 8, kind, i % 2 + 1);
         if (!strstr(label, only))
             continue;
-        Picture exemplar = read_picture(test->picture, test->size, test->channels);
-        run(test, kind, &exemplar, (int)(i % 2) + 1);
+        Picture exemplar = read_picture(test.picture, test.size, test.channels);
+        run(&test, kind, &exemplar, (int)(i % 2) + 1);
         free(exemplar.pixels);
     }
     return 0;

@@ -10,7 +10,7 @@
 //     └────────────┘   └────────────────┴────────────────┘
 //
 // AVX2 and plain C walk the same tile in pieces that fit their 16 registers. The product's rounding differs between
-// the three, which only moves bounds within their slack; what decides is rf_window_distance, one code for all.
+// the three, which only moves bounds within their slack; what decides is rf_window_distance.
 //
 // A minimum in registers for each query would end with the least bound alone. The search also wants all bounds below
 // the first full distance, so bounds are stored (24 stores a tile) and every 8 of them are folded into one minimum
@@ -116,41 +116,3 @@ RF_WIDE(rf_exclude_bounds,
         (const RfExclusion *exclusion, const float *restrict x, const float *restrict y, int count,
          float *restrict bounds),
         (exclusion, x, y, count, bounds))
-
-// Not RF_WIDE: the same instructions whatever the machine, and fast enough for the few candidates that get here.
-static inline Vec4 load4(const float *from)
-{
-    return *(const Vec4 *)from;
-}
-
-static inline Vec4 weighted_square(const float *a, const float *b, const float *weights)
-{
-    Vec4 d = load4(a) - load4(b);
-    return load4(weights) * (d * d);
-}
-
-float rf_window_distance(RfWindowRows a, RfWindowRows b, RfWindowRows weights, int rows, int count)
-{
-    // Four chains of sums: an addition takes as long as four can be begun in.
-    Vec4 even[2] = {{0}}, odd[2] = {{0}};
-    for (int j = 0; j < rows; ++j)
-    {
-        const float *p = a.numbers + j * a.stride, *q = b.numbers + j * b.stride,
-                    *w = weights.numbers + j * weights.stride;
-        Vec4 first = even[0], second = odd[0];
-        int i = 0;
-        for (; i + 8 <= count; i += 8)
-        {
-            first += weighted_square(p + i, q + i, w + i);
-            second += weighted_square(p + i + 4, q + i + 4, w + i + 4);
-        }
-        if (i < count)
-            first += weighted_square(p + i, q + i, w + i);
-        even[0] = even[1];
-        odd[0] = odd[1];
-        even[1] = first;
-        odd[1] = second;
-    }
-    Vec4 sum = (even[0] + even[1]) + (odd[0] + odd[1]);
-    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
-}

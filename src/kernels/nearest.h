@@ -48,6 +48,6 @@ typedef struct RfWindowRows
     ptrdiff_t stride;
 } RfWindowRows;
 
-/// Sum of weight * (a - b)^2 over rows of `count` numbers, a multiple of 4: numbers past the window's end must be
-/// finite and weigh 0. Always summed in the same order and never fused.
+/// Sum of weight * (a - b)^2 over rows of `count` numbers, the same bytes on every instruction set. Rows are read to
+/// the next multiple of 16: numbers past the window's end must be finite and weigh 0.
 float rf_window_distance(RfWindowRows a, RfWindowRows b, RfWindowRows weights, int rows, int count);

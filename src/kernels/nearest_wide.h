@@ -67,7 +67,9 @@ TARGET static int SET(find_least)(const float *bounds, const float *minima, int 
         all = LEAST(all, *(const Vector *)(minima + i));
     float lanes[WIDTH];
     *(Vector *)lanes = all;
+#pragma GCC unroll 4
     for (int half = WIDTH / 2; half > 0; half /= 2)
+#pragma GCC unroll 8
         for (int i = 0; i < half; ++i)
             lanes[i] = rf_min(lanes[i + half], lanes[i]);
     *value = lanes[0];

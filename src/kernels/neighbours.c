@@ -65,6 +65,8 @@ typedef struct Query
     // Of the numbers compared; and in all that the slack is made of.
     float norm, slack, residual_error;
     bool valid;
+    // The candidate of the chunk with the least bound.
+    int nearest;
     // distance + penalty of the best so far, its bare distance, and which it is
     float score, distance;
     int candidate;
@@ -303,8 +305,8 @@ static float bound_limit(const Search *search, const Query *query)
 static void compare(const Search *search, Query *query, int candidate)
 {
     const RfWindowDatabase *d = search->database;
-    float distance =
-              rf_window_distance(query->rows, rf_window_rows(d, candidate), query->weights, d->side, d->row_numbers),
+    float distance = rf_window_distance(query->rows, rf_window_rows(d, candidate), query->weights, d->side,
+                                        d->side * d->channels),
           score = search->queries->penalties ? distance + search->queries->penalties[candidate] : distance;
     if (score > query->score || (score == query->score && candidate > query->candidate))
         return;
@@ -314,22 +316,44 @@ static void compare(const Search *search, Query *query, int candidate)
     query->limit = bound_limit(search, query);
 }
 
-static void visit_chunk(const Search *search, Worker *worker, Query *query, const float *bounds, const float *minima,
-                        int first, int count)
+// Sets query->nearest, -1 if nothing in the chunk can be nearer than the best.
+static void find_nearest(Query *query, const float *bounds, const float *minima, int folded)
+{
+    float least;
+    query->nearest = rf_find_least(bounds, minima, folded, &least);
+    if (!query->valid || least == INFINITY || least > query->limit)
+        query->nearest = -1;
+}
+
+static void compare_others(const Search *search, Query *query, const float *bounds, const float *minima, int folded,
+                           int first, int *list)
+{
+    int listed = rf_list_below(bounds, minima, folded, query->limit, list);
+    for (int i = 0; i < listed; ++i)
+        if (list[i] != query->nearest && bounds[list[i]] <= query->limit)
+            compare(search, query, first + list[i]);
+}
+
+// Query by query in three passes: within one, a processor can begin a query before it has ended the one before.
+static void visit_chunk(const Search *search, Worker *worker, int start, int queries, int first, int count)
 {
     int folded = (count + RF_GROUP_CANDIDATES - 1) / RF_GROUP_CANDIDATES * RF_GROUP_LANES;
-    float least;
-    int nearest = rf_find_least(bounds, minima, folded, &least);
-    if (least == INFINITY || least > query->limit)
-        return;
-    compare(search, query, first + nearest);
-    int listed = rf_list_below(bounds, minima, folded, query->limit, worker->list);
-    for (int i = 0; i < listed; ++i)
+    const RfWindowPlace *excluded = search->queries->excluded;
+    for (int q = 0; q < queries; ++q)
     {
-        int candidate = worker->list[i];
-        if (candidate != nearest && bounds[candidate] <= query->limit)
-            compare(search, query, first + candidate);
+        float *bounds = worker->bounds + (size_t)q * search->bounds_stride,
+              *minima = worker->minima + (size_t)q * search->minima_stride;
+        if (excluded && excluded[start + q].copy >= 0)
+            exclude(search, excluded[start + q], first, count, bounds, minima);
+        find_nearest(&worker->query[q], bounds, minima, folded);
     }
+    for (int q = 0; q < queries; ++q)
+        if (worker->query[q].nearest >= 0)
+            compare(search, &worker->query[q], first + worker->query[q].nearest);
+    for (int q = 0; q < queries; ++q)
+        if (worker->query[q].nearest >= 0)
+            compare_others(search, &worker->query[q], worker->bounds + (size_t)q * search->bounds_stride,
+                           worker->minima + (size_t)q * search->minima_stride, folded, first, worker->list);
 }
 
 // ---- the walk ----------------------------------------------------------------------------------------------------
@@ -345,6 +369,17 @@ static void write_matches(const Search *search, const Query *query, int first, i
     }
 }
 
+// Queries come from memory once; the block that this worker is likely to take next comes while this one is searched.
+static void prefetch_queries(const Search *search, int64_t start, int count)
+{
+    int64_t numbers = search->database->numbers, left = search->queries->count - start;
+    if (left <= 0)
+        return;
+    const float *windows = search->queries->windows + start * numbers;
+    for (int64_t k = 0; k < numbers * (left < count ? left : count); k += 16)
+        __builtin_prefetch(windows + k, 0, 2);
+}
+
 static void search_block(void *context, int item, int index)
 {
     const Search *search = context;
@@ -356,20 +391,12 @@ static void search_block(void *context, int item, int index)
     for (int p = 0; p < panels; ++p)
         load_panel(search, worker, p, start + p * RF_TILE_QUERIES,
                    rf_min_int(RF_TILE_QUERIES, queries - p * RF_TILE_QUERIES));
+    prefetch_queries(search, start + (int64_t)block * rf_threads(), block);
     for (int first = 0; first < all; first += search->chunk)
     {
         int count = rf_min_int(search->chunk, all - first);
         fill_bounds(search, worker, panels, first, count);
-        for (int q = 0; q < queries; ++q)
-        {
-            float *bounds = worker->bounds + (size_t)q * search->bounds_stride,
-                  *minima = worker->minima + (size_t)q * search->minima_stride;
-            const RfWindowPlace *excluded = search->queries->excluded;
-            if (excluded && excluded[start + q].copy >= 0)
-                exclude(search, excluded[start + q], first, count, bounds, minima);
-            if (worker->query[q].valid)
-                visit_chunk(search, worker, &worker->query[q], bounds, minima, first, count);
-        }
+        visit_chunk(search, worker, start, queries, first, count);
     }
     write_matches(search, worker->query, start, queries);
 }

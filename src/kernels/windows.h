@@ -32,7 +32,7 @@ struct RfWindowDatabase
     /// [tiles * 32]: centres in the exemplar.
     float *centre_x, *centre_y;
     float period_x, period_y;
-    /// side * channels, rounded up to 4; the weights of such a row, 0 past its end.
+    /// side * channels, rounded up to 16; the weights of such a row, 0 past its end.
     int row_numbers;
     float *row_weights;
     float mean[RF_MAX_WINDOW_CHANNELS], scale[RF_MAX_WINDOW_CHANNELS];
