@@ -59,8 +59,8 @@ static inline float add_up(const float sums[SUMS])
 
 DEFINE_DISTANCE(distance_plain, 4, )
 #if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
-DEFINE_DISTANCE(distance_avx2, 8, __attribute__((target("arch=x86-64-v3"))))
-DEFINE_DISTANCE(distance_avx512, 16, __attribute__((target("arch=x86-64-v4,prefer-vector-width=512"))))
+DEFINE_DISTANCE(distance_avx2, 8, __attribute__((target("avx2,fma"))))
+DEFINE_DISTANCE(distance_avx512, 16, __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,fma"))))
 #endif
 
 float rf_window_distance(RfWindowRows a, RfWindowRows b, RfWindowRows weights, int rows, int count)
