@@ -19,7 +19,7 @@ enum
     // Up to here the numbers themselves are compared.
     COMPLETE_NUMBERS = 24,
     // Fastest are 11 on water, 23 to 27 on foam, 31 to 39 on gravel, 39 to 47 on bubbles, 47 to 63 on lava (64 x 64
-    // pixels, 9 x 9 x 2 numbers; bench/neighbours.c): the rule below is within 10 % of all of them.
+    // pixels, 9 x 9 x 2 numbers; bench/neighbours.c): the rule below is within 15 % of all of them.
     MOST_COMPONENTS = 47,
     LEAST_COMPONENTS = 7,
     MAX_NUMBERS = 1 << 14,
