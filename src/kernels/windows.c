@@ -21,12 +21,12 @@ enum
     // Fastest are 11 on water, 23 to 27 on foam, 31 to 39 on gravel, 39 to 47 on bubbles, 47 to 63 on lava (64 x 64
     // pixels, 9 x 9 x 2 numbers; bench/neighbours.c): the rule below is within 15 % of all of them.
     MOST_COMPONENTS = 47,
-    LEAST_COMPONENTS = 7,
+    LEAST_COMPONENTS = 11,
     MAX_NUMBERS = 1 << 14,
     PANELS_AN_ITEM = 8,
     POOL_MARGIN = 16
 };
-#define VARIANCE_WANTED 0.92
+#define VARIANCE_WANTED 0.93
 
 float rf_rounding_of(int numbers)
 {
