@@ -2,7 +2,7 @@
 // How fast is an exact search for nearest windows? CSV on stdout: case,size,threads,stage,ms (median of n runs),n,
 // floor of 32 numbers ms,floor of all numbers ms,GFLOP/s (of the floor of 32: what the whole search amounts to).
 //
-//   bench_neighbours [runs=7] [case=TEXT] [components=N]
+//   bench_neighbours [runs=5] [case=TEXT] [components=N] [picture=FILE]
 //
 // The floors are measured in the same run, one of each after every search: the bare blocked comparison of as many
 // queries and candidates of 32 numbers, or of all a window has, the minimum kept in registers, and nothing else: no
@@ -249,7 +249,7 @@ typedef struct Case
     int size, side, channels;
 } Case;
 
-static int g_runs = 7, g_components = 0;
+static int g_runs = 5, g_components = 0;
 
 static float *make_numbers(size_t count)
 {
@@ -275,7 +275,8 @@ static void run(const Case *test, const char *kind, const Picture *exemplar, int
           *candidate_numbers = make_numbers(tiles * 32 * (size_t)(numbers > 32 ? numbers : 32));
     float kept = 0;
     int components = 0, candidates = 0;
-    for (int r = 0; r < g_runs; ++r)
+    int runs = test->side > 9 ? 3 : g_runs; // these take seconds
+    for (int r = 0; r < runs; ++r)
     {
         double start = now();
         require(rf_windows_create(&source, 1, &options, &database));
@@ -289,14 +290,14 @@ static void run(const Case *test, const char *kind, const Picture *exemplar, int
         candidates = rf_windows_count(database);
         rf_windows_destroy(database);
     }
-    double search_ms = median(search, g_runs), few_ms = median(few, g_runs), all_ms = median(all, g_runs),
+    double search_ms = median(search, runs), few_ms = median(few, runs), all_ms = median(all, runs),
            flops = 2.0 * 32 * (double)tiles * 32 * QUERIES;
     const char *name = strrchr(test->picture, '/') ? strrchr(test->picture, '/') + 1 : test->picture;
     printf("%s %s (%dx%dx%d; %d components: %.1f %%),%dx%d,%d,search,%.2f,%d,%.2f,%.2f,%.0f\n", name, kind, test->side,
-           test->side, test->channels, components, (double)kept * 100, QUERIES, candidates, threads, search_ms, g_runs,
+           test->side, test->channels, components, (double)kept * 100, QUERIES, candidates, threads, search_ms, runs,
            few_ms, all_ms, flops / search_ms * 1e-6);
     printf("%s %s (%dx%dx%d; %d components: %.1f %%),%d,%d,create,%.2f,%d,,,\n", name, kind, test->side, test->side,
-           test->channels, components, (double)kept * 100, candidates, threads, median(create, g_runs), g_runs);
+           test->channels, components, (double)kept * 100, candidates, threads, median(create, runs), runs);
     printf("# %s %s: %.0f %% of the speed of the floor of 32 (%.0f GFLOP/s), %.1f times that of all\n", name, kind,
            100 * few_ms / search_ms, flops / few_ms * 1e-6, all_ms / search_ms);
     fflush(stdout);
@@ -308,13 +309,15 @@ static void run(const Case *test, const char *kind, const Picture *exemplar, int
 
 int main(int argc, char **argv)
 {
-    const char *only = "";
+    const char *only = "", *picture = NULL;
     for (int i = 1; i < argc; ++i)
     {
         if (strncmp(argv[i], "runs=", 5) == 0)
             g_runs = atoi(argv[i] + 5);
         if (strncmp(argv[i], "case=", 5) == 0)
             only = argv[i] + 5;
+        if (strncmp(argv[i], "picture=", 8) == 0)
+            picture = argv[i] + 8;
         if (strncmp(argv[i], "components=", 11) == 0)
             g_components = atoi(argv[i] + 11);
     }
@@ -328,14 +331,15 @@ int main(int argc, char **argv)
     printf("case,size,threads,stage,ms,runs,floor of 32 ms,floor of all ms,GFLOP/s\n");
     for (size_t i = 0; i < sizeof cases / sizeof cases[0] * 8; ++i)
     {
-        const Case *test = &cases[i / 8];
+        Case test = cases[i / 8];
+        test.picture = picture ? picture : test.picture;
         const char *kind = kinds[i / 2 % 4];
         char label[64];
         snprintf(label, sizeof label, "%zu%s%zu", i / 8, kind, i % 2 + 1);
         if (!strstr(label, only))
             continue;
-        Picture exemplar = read_picture(test->picture, test->size, test->channels);
-        run(test, kind, &exemplar, (int)(i % 2) + 1);
+        Picture exemplar = read_picture(test.picture, test.size, test.channels);
+        run(&test, kind, &exemplar, (int)(i % 2) + 1);
         free(exemplar.pixels);
     }
     return 0;

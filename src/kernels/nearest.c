@@ -10,7 +10,7 @@
 //     └────────────┘   └────────────────┴────────────────┘
 //
 // AVX2 and plain C walk the same tile in pieces that fit their 16 registers. The product's rounding differs between
-// the three, which only moves bounds within their slack; what decides is rf_window_distance, one code for all.
+// the three, which only moves bounds within their slack; what decides is rf_window_distance.
 //
 // A minimum in registers for each query would end with the least bound alone. The search also wants all bounds below
 // the first full distance, so bounds are stored (24 stores a tile) and every 8 of them are folded into one minimum
@@ -47,10 +47,11 @@ static inline unsigned below_4(Vec4 a, Vec4 limit)
 #define ROWS 6
 #include "kernels/nearest_wide.h"
 
-// As RF_WIDE, for functions whose three forms differ.
+// As RF_WIDE, for functions whose three forms differ. (clang 14 drops a target with an architecture and intrinsics then
+// fail, so the features are named.)
 #if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
 #define SET(name) name##_avx2
-#define TARGET __attribute__((target("arch=x86-64-v3")))
+#define TARGET __attribute__((target("avx2,fma")))
 #define WIDTH 8
 #define Vector Vec8
 #define ROWS 6
@@ -59,7 +60,7 @@ static inline unsigned below_4(Vec4 a, Vec4 limit)
 #include "kernels/nearest_wide.h"
 
 #define SET(name) name##_avx512
-#define TARGET __attribute__((target("arch=x86-64-v4,prefer-vector-width=512")))
+#define TARGET __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,fma")))
 #define WIDTH 16
 #define Vector Vec16
 #define ROWS 12
@@ -79,14 +80,14 @@ void rf_tile_products(const float *queries, const float *candidates, int numbers
     CHOOSE(tile_products)(queries, candidates, numbers, start, out, stride);
 }
 
-void rf_fold_group(const float *bounds, float *minima)
+void rf_fold_group(const float *bounds, ptrdiff_t bounds_stride, int queries, float *minima, ptrdiff_t minima_stride)
 {
-    CHOOSE(fold_group)(bounds, minima);
+    CHOOSE(fold_group)(bounds, bounds_stride, queries, minima, minima_stride);
 }
 
-void rf_find_least(const float *minima, int count, RfLeast *least)
+int rf_find_least(const float *bounds, const float *minima, int count, float *value)
 {
-    CHOOSE(find_least)(minima, count, least);
+    return CHOOSE(find_least)(bounds, minima, count, value);
 }
 
 int rf_list_below(const float *bounds, const float *minima, int count, float limit, int *list)
@@ -116,35 +117,3 @@ RF_WIDE(rf_exclude_bounds,
         (const RfExclusion *exclusion, const float *restrict x, const float *restrict y, int count,
          float *restrict bounds),
         (exclusion, x, y, count, bounds))
-
-// Not RF_WIDE: the same instructions whatever the machine, and fast enough for the few candidates that get here.
-static inline Vec4 load4(const float *from)
-{
-    return *(const Vec4 *)from;
-}
-
-static inline Vec4 weighted_square(const float *a, const float *b, const float *weights)
-{
-    Vec4 d = load4(a) - load4(b);
-    return load4(weights) * (d * d);
-}
-
-float rf_window_distance(RfWindowRows a, RfWindowRows b, RfWindowRows weights, int rows, int count)
-{
-    Vec4 even = {0, 0, 0, 0}, odd = {0, 0, 0, 0};
-    for (int j = 0; j < rows; ++j)
-    {
-        const float *p = a.numbers + j * a.stride, *q = b.numbers + j * b.stride,
-                    *w = weights.numbers + j * weights.stride;
-        int i = 0;
-        for (; i + 8 <= count; i += 8)
-        {
-            even += weighted_square(p + i, q + i, w + i);
-            odd += weighted_square(p + i + 4, q + i + 4, w + i + 4);
-        }
-        if (i < count)
-            even += weighted_square(p + i, q + i, w + i);
-    }
-    even += odd;
-    return (even[0] + even[1]) + (even[2] + even[3]);
-}

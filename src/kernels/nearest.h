@@ -21,19 +21,15 @@ enum
 void rf_tile_products(const float *queries, const float *candidates, int numbers, const float *start, float *out,
                       ptrdiff_t stride);
 
-/// minima[lane] = least of bounds[lane + 16 i] over a group of 128.
-void rf_fold_group(const float *bounds, float *minima);
+/// For each query: minima[lane] = least of bounds[lane + 16 i] over a group of 128.
+void rf_fold_group(const float *bounds, ptrdiff_t bounds_stride, int queries, float *minima, ptrdiff_t minima_stride);
 
-/// The least of minima[count] (a multiple of 16) and the first index it stands at.
-typedef struct RfLeast
-{
-    float value;
-    int index;
-} RfLeast;
-void rf_find_least(const float *minima, int count, RfLeast *least);
+/// A candidate that has the least bound, and that bound. minima[count] as rf_fold_group made them of bounds[8 * count];
+/// count is a multiple of 16.
+int rf_find_least(const float *bounds, const float *minima, int count, float *value);
 
 /// Lists the candidates whose bound is at most `limit`, group by group, lane by lane, and returns how many there are.
-/// minima[count] as rf_fold_group made them of bounds[8 * count]; the list needs room for one more than there can be.
+/// The list needs room for one more than there can be.
 int rf_list_below(const float *bounds, const float *minima, int count, float limit, int *list);
 
 /// A place that candidates may not overlap; `period` is 0 where nothing wraps.
@@ -52,6 +48,6 @@ typedef struct RfWindowRows
     ptrdiff_t stride;
 } RfWindowRows;
 
-/// Sum of weight * (a - b)^2 over rows of `count` numbers, a multiple of 4: numbers past the window's end must be
-/// finite and weigh 0. Always summed in the same order and never fused.
+/// Sum of weight * (a - b)^2 over rows of `count` numbers, the same bytes on every instruction set. Rows are read to
+/// the next multiple of 16: numbers past the window's end must be finite and weigh 0.
 float rf_window_distance(RfWindowRows a, RfWindowRows b, RfWindowRows weights, int rows, int count);

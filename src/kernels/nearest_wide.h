@@ -46,36 +46,46 @@ TARGET static void SET(tile_products)(const float *queries, const float *candida
             SET(tile_piece)(queries + q, candidates + c, numbers, start + c, out + q * stride + c, stride);
 }
 
-TARGET static void SET(fold_group)(const float *bounds, float *minima)
+TARGET static void SET(fold_group)(const float *bounds, ptrdiff_t bounds_stride, int queries, float *minima,
+                                   ptrdiff_t minima_stride)
 {
-    for (int lane = 0; lane < RF_GROUP_LANES; lane += WIDTH)
-    {
-        Vector least = *(const Vector *)(bounds + lane);
-        for (int i = RF_GROUP_LANES; i < RF_GROUP_CANDIDATES; i += RF_GROUP_LANES)
-            least = LEAST(least, *(const Vector *)(bounds + i + lane));
-        *(Vector *)(minima + lane) = least;
-    }
+    for (int q = 0; q < queries; ++q, bounds += bounds_stride, minima += minima_stride)
+        for (int lane = 0; lane < RF_GROUP_LANES; lane += WIDTH)
+        {
+            Vector least = *(const Vector *)(bounds + lane);
+#pragma GCC unroll 8
+            for (int i = RF_GROUP_LANES; i < RF_GROUP_CANDIDATES; i += RF_GROUP_LANES)
+                least = LEAST(least, *(const Vector *)(bounds + i + lane));
+            *(Vector *)(minima + lane) = least;
+        }
 }
 
-TARGET static void SET(find_least)(const float *minima, int count, RfLeast *least)
+TARGET static int SET(find_least)(const float *bounds, const float *minima, int count, float *value)
 {
     Vector all = *(const Vector *)minima;
     for (int i = WIDTH; i < count; i += WIDTH)
         all = LEAST(all, *(const Vector *)(minima + i));
-    float value = all[0];
-    for (int i = 1; i < WIDTH; ++i)
-        value = rf_min(all[i], value);
-    Vector limit = value - (Vector){0};
-    *least = (RfLeast){value, 0};
+    float lanes[WIDTH];
+    *(Vector *)lanes = all;
+#pragma GCC unroll 4
+    for (int half = WIDTH / 2; half > 0; half /= 2)
+#pragma GCC unroll 8
+        for (int i = 0; i < half; ++i)
+            lanes[i] = rf_min(lanes[i + half], lanes[i]);
+    *value = lanes[0];
+    Vector limit = lanes[0] - (Vector){0};
     for (int i = 0; i < count; i += WIDTH)
     {
         unsigned bits = BELOW(*(const Vector *)(minima + i), limit);
-        if (bits)
-        {
-            least->index = i + __builtin_ctz(bits);
-            return;
-        }
+        if (!bits)
+            continue;
+        int lane = i + __builtin_ctz(bits), found = lane / RF_GROUP_LANES * RF_GROUP_CANDIDATES + lane % RF_GROUP_LANES,
+            first = found;
+        for (int c = first; c < first + RF_GROUP_CANDIDATES; c += RF_GROUP_LANES)
+            found = bounds[c] <= lanes[0] ? c : found;
+        return found;
     }
+    return 0;
 }
 
 TARGET static int SET(list_below)(const float *bounds, const float *minima, int count, float limit, int *list)

@@ -16,15 +16,22 @@
 //     2. the full distance of the candidate with the least bound: no better one can be farther away
 //     3. the full distance of every other candidate whose bound does not exceed the best so far
 //
-// Step 3 finds 2 to 40 candidates among thousands, and the residual's norm is what makes them so few: without it ten
-// times as many are left. Candidates are walked in chunks, so that the bounds stay in the second cache; the best so far
-// goes from chunk to chunk.
+// Step 3 finds 2 to 20 candidates of 3136 on water and foam (9 x 9 x 2 numbers), 50 to 200 on what has no dominant
+// components, such as bubbles; more components are kept there (windows.c). The residual's norm leaves 2 to 20 times
+// fewer where queries are blended or the exemplar is smooth, and is worth one more component elsewhere.
+//
+// Candidates are walked in chunks, so that the bounds stay in the second cache; the best so far goes from chunk to
+// chunk.
+//
+// Tried and dropped: norms of groups of components, or of the residual's quarters, instead of components (more
+// candidates are left for as many numbers); a second bound from 14 further components for what the first one leaves (15
+// % faster on lava, no faster elsewhere); groups of 2 or 8 tiles instead of 4.
 //
 // Exact in spite of rounding. Steps 2 and 3 compare by direct differences in one order, whatever the instruction set.
-// Bounds are rounded, so step 3 grants them a slack: sums of n products are taken to be off by n 2^-23 of their terms'
-// sum, four times what n rounded operations of random sign leave at n = 16, sixteen times at n = 256 (Higham and Mary.
-// A new approach to probabilistic rounding error analysis. 2019), and as much as they can ever leave. A residual's norm
-// is the root of a difference; how far it can be off is kept with it (windows.c).
+// Bounds are rounded, so step 3 grants them a slack: a sum of n products is taken to be off by n 2^-23 of the sum of
+// their sizes, twice the worst that can be (n 2^-24), and many times what rounding of random sign leaves (sqrt(n)
+// 2^-24; Higham and Mary. A new approach to probabilistic rounding error analysis. 2019). It costs nothing that could
+// be measured. A residual's norm is the root of a difference; how far it can be off is kept with it (windows.c).
 //
 // Few numbers (w <= 3 or so) are compared as they are. Masked queries have no common components; they are compared in
 // all numbers, and in one more a pixel, which makes the weighted square a product too:
@@ -65,6 +72,8 @@ typedef struct Query
     // Of the numbers compared; and in all that the slack is made of.
     float norm, slack, residual_error;
     bool valid;
+    // The candidate of the chunk with the least bound.
+    int nearest;
     // distance + penalty of the best so far, its bare distance, and which it is
     float score, distance;
     int candidate;
@@ -105,33 +114,52 @@ static size_t row_room(const RfWindowDatabase *d)
     return (size_t)d->side * (size_t)d->row_numbers;
 }
 
-// Copies a query to rows that are padded with 0; numbers of weight 0 become 0.
+static bool all_in_range(const float *numbers, int count)
+{
+    int outside = 0;
+    for (int k = 0; k < count; ++k)
+        outside += !(fabsf(numbers[k]) <= RF_WINDOW_LARGEST);
+    return outside == 0;
+}
+
+// Rows are padded with 0. (A call of memcpy takes longer than these few numbers.)
+static void copy_row(const float *row, int count, int padded, float *out)
+{
+    int i = 0;
+    for (; i + 4 <= count; i += 4)
+        memcpy(out + i, row + i, 4 * sizeof *out);
+    for (; i < padded; ++i)
+        out[i] = i < count ? row[i] : 0;
+}
+
+// Numbers of weight 0 become 0.
+static void mask_row(const RfWindowDatabase *d, const float *mask, float *row, float *weights)
+{
+    for (int i = 0; i < d->row_numbers; ++i)
+    {
+        float weight = i < d->side * d->channels ? mask[i / d->channels] : 0;
+        weights[i] = weight * d->row_weights[i];
+        row[i] = weight > 0 ? row[i] : 0;
+    }
+}
+
+// Returns whether all numbers that count are in range.
 static bool copy_query(const Search *search, int index, float *rows, float *weights)
 {
     const RfWindowDatabase *d = search->database;
-    const float *window = search->queries->windows + (size_t)index * (size_t)d->numbers,
-                *mask = search->masked ? search->queries->weights + (size_t)index * (size_t)d->side * (size_t)d->side
-                                       : NULL;
     int row = d->side * d->channels;
-    bool valid = true;
-    for (int j = 0; j < d->side; ++j, rows += d->row_numbers, window += row)
-    {
-        memcpy(rows, window, (size_t)row * sizeof *rows);
-        for (int i = row; i < d->row_numbers; ++i)
-            rows[i] = 0;
-        for (int i = 0; mask && i < d->row_numbers; ++i)
-        {
-            float weight = i < row ? mask[j * d->side + i / d->channels] : 0;
-            weights[j * d->row_numbers + i] = weight * d->row_weights[i];
-            rows[i] = weight > 0 ? rows[i] : 0;
-        }
-        for (int i = 0; i < row; ++i)
-            valid &= fabsf(rows[i]) <= RF_WINDOW_LARGEST;
-    }
-    return valid;
+    const float *window = search->queries->windows + (size_t)index * (size_t)d->numbers;
+    for (int j = 0; j < d->side; ++j)
+        copy_row(window + j * row, row, d->row_numbers, rows + j * d->row_numbers);
+    if (!search->masked)
+        return all_in_range(window, d->numbers);
+    const float *mask = search->queries->weights + (size_t)index * (size_t)d->side * (size_t)d->side;
+    for (int j = 0; j < d->side; ++j)
+        mask_row(d, mask + j * d->side, rows + j * d->row_numbers, weights + j * d->row_numbers);
+    return all_in_range(rows, d->side * d->row_numbers);
 }
 
-// -m s^2 q and m / 2: see the top. `panel` holds s q; sums[q] becomes sum m s^2 q^2.
+// m s^2 q and m / 2: see the top. `panel` holds s q; sums[q] becomes sum m s^2 q^2.
 static void mask_panel(const Search *search, int first, int count, const float *panel, float *kept, float *sums)
 {
     const RfWindowDatabase *d = search->database;
@@ -146,22 +174,12 @@ static void mask_panel(const Search *search, int first, int count, const float *
         for (int k = 0; k < d->numbers; ++k)
         {
             float number = panel[k * RF_TILE_QUERIES + q], weight = mask[k / d->channels];
-            kept[k * RF_TILE_QUERIES + q] = -weight * number;
+            kept[k * RF_TILE_QUERIES + q] = weight * number;
             sums[q] += weight * number * number;
         }
         for (int p = 0; p < pixels; ++p)
             halves[p * RF_TILE_QUERIES + q] = 0.5f * mask[p];
     }
-}
-
-static void keep_queries(const RfWindowDatabase *d, const float *panel, const float *products,
-                         const RfPanelNorms *norms, float *kept)
-{
-    for (int k = 0; k < d->kept; ++k)
-        for (int q = 0; q < RF_TILE_QUERIES; ++q)
-            kept[k * RF_TILE_QUERIES + q] = d->complete          ? -panel[k * RF_TILE_QUERIES + q]
-                                            : k == d->components ? -norms->residual[q]
-                                                                 : -products[q * d->blocks * RF_BASIS_BLOCK + k];
 }
 
 static float most_weight(const Search *search, int index)
@@ -198,9 +216,7 @@ static void load_panel(const Search *search, Worker *worker, int panel_index, in
     }
     else
     {
-        rf_project_panel(worker->panel, d->numbers, d->basis, d->blocks, worker->products);
-        rf_measure_panel(d, worker->panel, worker->products, &norms);
-        keep_queries(d, worker->panel, worker->products, &norms, kept);
+        rf_keep_panel(d, worker->panel, worker->products, kept, &norms);
     }
     float rounding = rf_rounding_of(d->numbers + search->kept);
     for (int q = 0; q < count; ++q)
@@ -216,7 +232,8 @@ static void load_panel(const Search *search, Worker *worker, int panel_index, in
 
 // ---- bounds ------------------------------------------------------------------------------------------------------
 
-// A tile for masked queries: numbers [numbers][32], then their squares, summed over a pixel's channels, [pixels][32].
+// A tile for masked queries: negative numbers [numbers][32], then their squares, summed over a pixel's channels,
+// [pixels][32].
 static void gather_tile(const Search *search, int first, Worker *worker)
 {
     const RfWindowDatabase *d = search->database;
@@ -233,7 +250,7 @@ static void gather_tile(const Search *search, int first, Worker *worker)
             for (int q = 0; q < count; ++q)
             {
                 float number = worker->panel[k * RF_TILE_QUERIES + q];
-                worker->tile[k * RF_TILE_CANDIDATES + part + q] = number;
+                worker->tile[k * RF_TILE_CANDIDATES + part + q] = -number;
                 squares[k / d->channels * RF_TILE_CANDIDATES + part + q] += number * number;
             }
     }
@@ -260,13 +277,13 @@ static void fill_bounds(const Search *search, Worker *worker, int panels, int fi
                                  worker->bounds + (size_t)p * RF_TILE_QUERIES * search->bounds_stride + c,
                                  (ptrdiff_t)search->bounds_stride);
         }
-        for (int q = 0; q < panels * RF_TILE_QUERIES; ++q)
-        {
-            float *bounds = worker->bounds + (size_t)q * search->bounds_stride + group;
+        int queries = panels * RF_TILE_QUERIES;
+        float *bounds = worker->bounds + group;
+        for (int q = 0; q < queries && end - group < RF_GROUP_CANDIDATES; ++q)
             for (int c = end - group; c < RF_GROUP_CANDIDATES; ++c)
-                bounds[c] = INFINITY;
-            rf_fold_group(bounds, worker->minima + (size_t)q * search->minima_stride + group / FOLD);
-        }
+                bounds[(size_t)q * search->bounds_stride + (size_t)c] = INFINITY;
+        rf_fold_group(bounds, (ptrdiff_t)search->bounds_stride, queries, worker->minima + group / FOLD,
+                      (ptrdiff_t)search->minima_stride);
     }
 }
 
@@ -277,7 +294,7 @@ static void exclude(const Search *search, RfWindowPlace place, int first, int co
     rf_window_centre(d, place, &exclusion.x, &exclusion.y);
     rf_exclude_bounds(&exclusion, d->centre_x + first, d->centre_y + first, count, bounds);
     for (int group = 0; group < count; group += RF_GROUP_CANDIDATES)
-        rf_fold_group(bounds + group, minima + group / FOLD);
+        rf_fold_group(bounds + group, 0, 1, minima + group / FOLD, 0);
 }
 
 // ---- full comparisons --------------------------------------------------------------------------------------------
@@ -295,8 +312,8 @@ static float bound_limit(const Search *search, const Query *query)
 static void compare(const Search *search, Query *query, int candidate)
 {
     const RfWindowDatabase *d = search->database;
-    float distance =
-              rf_window_distance(query->rows, rf_window_rows(d, candidate), query->weights, d->side, d->row_numbers),
+    float distance = rf_window_distance(query->rows, rf_window_rows(d, candidate), query->weights, d->side,
+                                        d->side * d->channels),
           score = search->queries->penalties ? distance + search->queries->penalties[candidate] : distance;
     if (score > query->score || (score == query->score && candidate > query->candidate))
         return;
@@ -306,25 +323,44 @@ static void compare(const Search *search, Query *query, int candidate)
     query->limit = bound_limit(search, query);
 }
 
-static void visit_chunk(const Search *search, Worker *worker, Query *query, const float *bounds, const float *minima,
-                        int first, int count)
+// Sets query->nearest, -1 if nothing in the chunk can be nearer than the best.
+static void find_nearest(Query *query, const float *bounds, const float *minima, int folded)
 {
-    RfLeast least;
-    int folded = (count + RF_GROUP_CANDIDATES - 1) / RF_GROUP_CANDIDATES * RF_GROUP_LANES;
-    rf_find_least(minima, folded, &least);
-    if (least.value == INFINITY || least.value > query->limit)
-        return;
-    int nearest = least.index / RF_GROUP_LANES * RF_GROUP_CANDIDATES + least.index % RF_GROUP_LANES;
-    while (bounds[nearest] != least.value)
-        nearest += RF_GROUP_LANES;
-    compare(search, query, first + nearest);
-    int listed = rf_list_below(bounds, minima, folded, query->limit, worker->list);
+    float least;
+    query->nearest = rf_find_least(bounds, minima, folded, &least);
+    if (!query->valid || least == INFINITY || least > query->limit)
+        query->nearest = -1;
+}
+
+static void compare_others(const Search *search, Query *query, const float *bounds, const float *minima, int folded,
+                           int first, int *list)
+{
+    int listed = rf_list_below(bounds, minima, folded, query->limit, list);
     for (int i = 0; i < listed; ++i)
+        if (list[i] != query->nearest && bounds[list[i]] <= query->limit)
+            compare(search, query, first + list[i]);
+}
+
+// Query by query in three passes: within one, a processor can begin a query before it has ended the one before.
+static void visit_chunk(const Search *search, Worker *worker, int start, int queries, int first, int count)
+{
+    int folded = (count + RF_GROUP_CANDIDATES - 1) / RF_GROUP_CANDIDATES * RF_GROUP_LANES;
+    const RfWindowPlace *excluded = search->queries->excluded;
+    for (int q = 0; q < queries; ++q)
     {
-        int candidate = worker->list[i];
-        if (candidate != nearest && bounds[candidate] <= query->limit)
-            compare(search, query, first + candidate);
+        float *bounds = worker->bounds + (size_t)q * search->bounds_stride,
+              *minima = worker->minima + (size_t)q * search->minima_stride;
+        if (excluded && excluded[start + q].copy >= 0)
+            exclude(search, excluded[start + q], first, count, bounds, minima);
+        find_nearest(&worker->query[q], bounds, minima, folded);
     }
+    for (int q = 0; q < queries; ++q)
+        if (worker->query[q].nearest >= 0)
+            compare(search, &worker->query[q], first + worker->query[q].nearest);
+    for (int q = 0; q < queries; ++q)
+        if (worker->query[q].nearest >= 0)
+            compare_others(search, &worker->query[q], worker->bounds + (size_t)q * search->bounds_stride,
+                           worker->minima + (size_t)q * search->minima_stride, folded, first, worker->list);
 }
 
 // ---- the walk ----------------------------------------------------------------------------------------------------
@@ -340,6 +376,17 @@ static void write_matches(const Search *search, const Query *query, int first, i
     }
 }
 
+// Queries come from memory once; the block that this worker is likely to take next comes while this one is searched.
+static void prefetch_queries(const Search *search, int64_t start, int count)
+{
+    int64_t numbers = search->database->numbers, left = search->queries->count - start;
+    if (left <= 0)
+        return;
+    const float *windows = search->queries->windows + start * numbers;
+    for (int64_t k = 0; k < numbers * (left < count ? left : count); k += 16)
+        __builtin_prefetch(windows + k, 0, 2);
+}
+
 static void search_block(void *context, int item, int index)
 {
     const Search *search = context;
@@ -351,20 +398,12 @@ static void search_block(void *context, int item, int index)
     for (int p = 0; p < panels; ++p)
         load_panel(search, worker, p, start + p * RF_TILE_QUERIES,
                    rf_min_int(RF_TILE_QUERIES, queries - p * RF_TILE_QUERIES));
+    prefetch_queries(search, start + (int64_t)block * rf_threads(), block);
     for (int first = 0; first < all; first += search->chunk)
     {
         int count = rf_min_int(search->chunk, all - first);
         fill_bounds(search, worker, panels, first, count);
-        for (int q = 0; q < queries; ++q)
-        {
-            float *bounds = worker->bounds + (size_t)q * search->bounds_stride,
-                  *minima = worker->minima + (size_t)q * search->minima_stride;
-            const RfWindowPlace *excluded = search->queries->excluded;
-            if (excluded && excluded[start + q].copy >= 0)
-                exclude(search, excluded[start + q], first, count, bounds, minima);
-            if (worker->query[q].valid)
-                visit_chunk(search, worker, &worker->query[q], bounds, minima, first, count);
-        }
+        visit_chunk(search, worker, start, queries, first, count);
     }
     write_matches(search, worker->query, start, queries);
 }

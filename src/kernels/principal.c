@@ -8,11 +8,11 @@
 //     repeat:  Y = X B,  B = orthonormal(X^T Y)
 //     last:    H = Y^T Y = V diag(variances) V^T,  B = B V
 //
-// Why not LAPACK, the house's linear algebra? ssyevr on the covariance is as fast up to some 300 numbers a window, but
-// grows with their cube (7 s for 17 x 17 windows of 16 channels, where this takes a tenth), so the iteration is needed
-// in any case; it is all of 100 lines on top of the search's own tile; it needs only a window at a time, no covariance;
-// its result is independent of threads without telling OpenBLAS, on behalf of a whole process, how many to use. The
-// last percent of the variance that a finite iteration leaves costs a few more full comparisons and no exactness.
+// Why not LAPACK? ssyevr on the covariance is as fast up to some 300 numbers a window, but grows with their cube (7 s
+// for 17 x 17 windows of 16 channels, where a whole database takes 0.6 s this way), so the iteration is needed in any
+// case. It is short on top of the search's own tile; it reads a window at a time and stores no covariance; and its
+// result does not depend on threads without telling OpenBLAS, on behalf of a whole process, how many to use. What a
+// finite iteration on a sample leaves (0.1 to 0.7 % of the variance) costs a few full comparisons and no exactness.
 
 #include "kernels/principal.h"
 #include "core/memory.h"
@@ -26,7 +26,8 @@
 
 enum
 {
-    // Foam, bubbles and photographs at w = 5 to 17: after 3 the kept variance is within 0.2 % of ssyevr's.
+    // 31 components of 9 x 9 x 2 numbers then hold 95.5 % of foam, 77.9 % of bubbles, 88.8 % of lava; the best
+    // ones 95.6, 78.6 and 89.0.
     ITERATIONS = 3,
     // Fixed, so that sums do not depend on the number of threads.
     PARTS = 8,

@@ -32,7 +32,7 @@ struct RfWindowDatabase
     /// [tiles * 32]: centres in the exemplar.
     float *centre_x, *centre_y;
     float period_x, period_y;
-    /// side * channels, rounded up to 4; the weights of such a row, 0 past its end.
+    /// side * channels, rounded up to 16; the weights of such a row, 0 past its end.
     int row_numbers;
     float *row_weights;
     float mean[RF_MAX_WINDOW_CHANNELS], scale[RF_MAX_WINDOW_CHANNELS];
@@ -43,16 +43,16 @@ struct RfWindowDatabase
     float variance_kept;
     /// [blocks][numbers][32]
     float *basis;
-    /// [tiles][kept][32], and half the squared norm, [tiles * 32], INFINITY past the last candidate.
+    /// [tiles][kept][32], negative, and half the squared norm, [tiles * 32], INFINITY past the last candidate.
     float *kept_numbers, *half_norms;
     /// Over all candidates: the largest squared norm, and how far a residual's norm can be off.
     float largest_norm, residual_error;
 };
 
-/// What a panel of 12 windows is in the comparison.
+/// Squared norms of a panel's 12 windows, and how far the norms of their residuals can be off.
 typedef struct RfPanelNorms
 {
-    float norm[RF_TILE_QUERIES], residual[RF_TILE_QUERIES], residual_error[RF_TILE_QUERIES];
+    float norm[RF_TILE_QUERIES], residual_error[RF_TILE_QUERIES];
 } RfPanelNorms;
 
 /// Not masked out, and numbers that a search can take.
@@ -67,8 +67,9 @@ void rf_window_centre(const RfWindowDatabase *database, RfWindowPlace place, flo
 /// 0.
 void rf_pack_panel(const RfWindowDatabase *database, const RfWindowRows *windows, int count, float *panel);
 
-/// products[12][blocks * 32] are the panel's coordinates on the basis (unused if the database is complete).
-void rf_measure_panel(const RfWindowDatabase *database, const float *panel, const float *products, RfPanelNorms *norms);
+/// What of a panel is compared: kept[kept][12]. products: room for [12][blocks * 32].
+void rf_keep_panel(const RfWindowDatabase *database, const float *panel, float *products, float *kept,
+                   RfPanelNorms *norms);
 
 /// Twice the unit roundoff times the length of the sums behind a bound: see neighbours.c.
 float rf_rounding_of(int numbers);
