@@ -2,6 +2,8 @@
 #include "exemplar_input.h"
 #include "errors.h"
 #include "inputs.h"
+#include "progress.h"
+#include "text.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -86,8 +88,27 @@ static RfMapKind kind_of(const char *name, int channels)
     return strcmp(name, "alpha") == 0 ? RF_MAP_ALPHA : RF_MAP_DATA;
 }
 
+/// A misspelt "normal" would not be turned with the texture, and nobody could see why.
+static void warn_of_data(const Settings *settings, const MapArgument *argument, RfMapKind kind, int channels)
+{
+    static const char turned[] = "motion|velocity";
+    static const char plain[] = "height|displacement|bump|roughness|gloss|specular|metallic|occlusion|emission|"
+                                "temperature|density";
+    if (kind != RF_MAP_DATA || text_choice(plain, argument->name) >= 0)
+        return;
+    char list[256];
+    text_list(plain, list, sizeof list);
+    if (text_choice(turned, argument->name) >= 0)
+        warn(settings, argument->file, "map %s has %d channels, not 2: it is treated as plain data and not turned",
+             argument->name, channels);
+    else
+        warn(settings, argument->file,
+             "map %s is treated as plain data, as %s are; known beside them: alpha, normal, motion and velocity",
+             argument->name, list);
+}
+
 /// Alpha is one channel: the file's first. Other maps are what the file has.
-static int read_map(Parts *parts, const MapArgument *argument)
+static int read_map(const Settings *settings, Parts *parts, const MapArgument *argument)
 {
     RfImage *image = NULL;
     RfResult result = rf_image_read(argument->file, &image);
@@ -95,6 +116,7 @@ static int read_map(Parts *parts, const MapArgument *argument)
         return fail_result(result, argument->file);
     RfImageView view = rf_image_view(image);
     RfMapKind kind = kind_of(argument->name, view.channels);
+    warn_of_data(settings, argument, kind, view.channels);
     int channels = kind == RF_MAP_ALPHA ? 1 : kind == RF_MAP_NORMAL && view.channels > 3 ? 3 : view.channels;
     if (channels < view.channels)
     {
@@ -198,7 +220,7 @@ int exemplar_input_read(const Settings *settings, const char *path, bool colour_
     Parts parts = {0};
     int code = read_exemplar(&parts, path, colour_only);
     for (int i = 0; i < settings->map_count && !code; ++i)
-        code = read_map(&parts, &settings->maps[i]);
+        code = read_map(settings, &parts, &settings->maps[i]);
     if (!code)
         code = make(settings, path, &parts, input);
     for (int i = 0; i < parts.image_count; ++i)

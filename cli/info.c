@@ -3,10 +3,12 @@
 #include "errors.h"
 #include "flow_input.h"
 #include "image_input.h"
+#include "layout.h"
 #include "verbs.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 static const char *format_name(RfSampleFormat format)
 {
@@ -50,6 +52,94 @@ static Range channel_range(const RfImageView *view, int channel)
     return range;
 }
 
+/// What an image would be as an exemplar or a flow.
+typedef struct Uses
+{
+    bool exemplar, tiles;
+    double border_roughness;
+    /// The lagrangian method's default, and the largest it takes; 0: any.
+    double radius, largest_radius;
+    /// "R,G": its channels are as those of a flow, and there are no others.
+    const char *flow;
+} Uses;
+
+static const char *flow_channels(const RfImage *image)
+{
+    static const char *const pairs[] = {"R,G", "X,Y", "u,v", "forward.u,forward.v", "velocity.x,velocity.y"};
+    char names[80];
+    snprintf(names, sizeof names, "%s,%s", rf_image_channel_name(image, 0), rf_image_channel_name(image, 1));
+    for (size_t i = 0; i < sizeof pairs / sizeof pairs[0]; ++i)
+        if (strcmp(names, pairs[i]) == 0)
+            return pairs[i];
+    return NULL;
+}
+
+/// The sizes in grids and radii are those of rf_lagrangian_create.
+static void judge_exemplar(const RfExemplar *exemplar, Uses *uses)
+{
+    const double default_radius = 64, least_sides = 3.9, least_sides_tiling = 2.6;
+    double side = fmin(rf_exemplar_width(exemplar), rf_exemplar_height(exemplar));
+    uses->exemplar = true;
+    uses->tiles = rf_exemplar_tiles(exemplar);
+    uses->border_roughness = (double)rf_exemplar_border_roughness(exemplar);
+    // Rounded down, so that what is printed is taken.
+    uses->largest_radius = uses->tiles ? 0 : floor(10 * side / least_sides) / 10;
+    double fits = uses->tiles ? floor(10 * side / least_sides_tiling) / 10 : uses->largest_radius;
+    uses->radius = fmax(2, fmin(default_radius, fits));
+}
+
+/// Images that are no exemplar (too small, without colour, not finite) have no uses; that is no failure.
+static Uses uses_of(const RfImage *image)
+{
+    Uses uses = {0};
+    Layout layout;
+    RfImage *pixels = NULL;
+    RfExemplar *exemplar = NULL;
+    if (rf_image_view(image).channels == 2)
+        uses.flow = flow_channels(image);
+    if (layout_split(image, &layout, &pixels) != RF_OK)
+        return uses;
+    RfImageView view = rf_image_view(pixels);
+    RfMapView map = {.name = "all", .kind = RF_MAP_DATA, .image = view, .weight = 1};
+    if (layout.colours > 0 && layout_encode(&view, &layout, RF_ENCODING_SRGB) == RF_OK &&
+        rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar) == RF_OK)
+        judge_exemplar(exemplar, &uses);
+    rf_exemplar_destroy(exemplar);
+    rf_image_destroy(pixels);
+    return uses;
+}
+
+static void print_uses_json(const Uses *uses)
+{
+    if (uses->exemplar)
+    {
+        printf(",\"exemplar\":{\"tiles\":%s,\"border_roughness\":", uses->tiles ? "true" : "false");
+        print_json_number(stdout, uses->border_roughness);
+        printf(",\"particle_radius\":%g,\"largest_particle_radius\":", uses->radius);
+        print_json_number(stdout, uses->largest_radius > 0 ? uses->largest_radius : NAN);
+        fputc('}', stdout);
+    }
+    if (uses->flow)
+    {
+        fputc(',', stdout);
+        print_json_member(stdout, "flow_variables", uses->flow);
+    }
+}
+
+static void print_uses(const Uses *uses)
+{
+    if (uses->flow)
+        printf("  can be a flow: --variables %s reads it as one\n", uses->flow);
+    if (!uses->exemplar)
+        return;
+    printf("  tiles: %s (borders %.3g times as rough as the inside)%s\n", uses->tiles ? "seems so" : "seems not",
+           uses->border_roughness, uses->tiles ? "" : "; --exemplar-tiles yes says otherwise");
+    if (uses->tiles)
+        printf("  particle radius: %g unless given, any fits\n", uses->radius);
+    else
+        printf("  particle radius: %g unless given, %g at most\n", uses->radius, uses->largest_radius);
+}
+
 static void print_image_json(const ImageInput *input, const RfImage *image)
 {
     RfImageView view = rf_image_view(image);
@@ -75,7 +165,10 @@ static void print_image_json(const ImageInput *input, const RfImage *image)
         print_json_number(stdout, range.mean);
         printf(",\"not_finite\":%lld}", (long long)range.not_finite);
     }
-    fputs("]}\n", stdout);
+    fputc(']', stdout);
+    Uses uses = uses_of(image);
+    print_uses_json(&uses);
+    fputs("}\n", stdout);
 }
 
 static void print_image(const ImageInput *input, const RfImage *image)
@@ -96,6 +189,8 @@ static void print_image(const ImageInput *input, const RfImage *image)
             printf(", %lld not finite", (long long)range.not_finite);
         fputc('\n', stdout);
     }
+    Uses uses = uses_of(image);
+    print_uses(&uses);
 }
 
 static int image_info(const Settings *settings, const char *path)

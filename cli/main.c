@@ -13,15 +13,23 @@ static const Verb g_verbs[] = {
     {"texture", VERB_TEXTURE, "FLOW EXEMPLAR OUTPUT", 3, false, "texture a 2D flow",
      "Maps of the exemplar other than colour and alpha are written as OUTPUT.NAME.%04d.exr beside PNG frames, and all\n"
      "in one file where OUTPUT is EXR or NPY. A stopped run leaves .NAME.rfstate beside its first frame for "
-     "--resume.\n",
+     "--resume.\n"
+     "A map named normal holds x right, y up and z out in 0 to 1 (0.5 is 0; green is up, as in OpenGL), motion or\n"
+     "velocity two channels x right, y down: both are turned with the texture. alpha is opacity; all others are "
+     "data.\n",
      run_texture},
     {"render", VERB_RENDER, "INPUT OUTPUT", 2, false, "show a flow or a field of heights as images or video",
      "INPUT is a flow, or for --as relief images: heights from 0 to 1 (a channel named height, else the first), or\n"
-     "colours with --map height=FRAMES.\n",
+     "colours with --map height=FRAMES. A steady flow fills one name without a number (out.png), or 100 frames.\n",
      run_render},
     {"convert", VERB_CONVERT, "INPUT OUTPUT", 2, false, "between the formats of one kind of data",
-     "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti.\n", run_convert},
-    {"info", VERB_INFO, "FILE...", 1, true, "what is in it: kind, size, channels, range, time, conventions", NULL,
+     "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti, a file a moment where the name "
+     "has\n"
+     "a number in it; out.npy takes all moments as [T, H, W, 2].\n",
+     run_convert},
+    {"info", VERB_INFO, "FILE...", 1, true, "what is in it: kind, size, channels, range, time, conventions",
+     "Of an image also: whether it tiles, and which particle radius it has room for as an exemplar; whether it can be\n"
+     "a flow.\n",
      run_info},
 };
 

@@ -105,6 +105,21 @@ int outputs_open(Outputs *outputs, const Settings *settings, const char *destina
     return check_conflicts(outputs);
 }
 
+int outputs_gather(Outputs *outputs, int count)
+{
+    outputs->count_of_frames = count;
+    for (int i = 0; i < outputs->count && count > 1; ++i)
+    {
+        Output *output = &outputs->list[i];
+        if (output->kind == OUTPUT_FLOW && !output->pattern.numbered && text_extension_in(output->text, "npy"))
+            output->kind = OUTPUT_ARRAY;
+        if (output->kind == OUTPUT_ARRAY && outputs->settings->resume)
+            return fail(CODE_USAGE, NULL, NULL, "--resume: %s takes all moments at once and cannot be resumed",
+                        output->text);
+    }
+    return CODE_DONE;
+}
+
 const Output *outputs_first_image(const Outputs *outputs)
 {
     for (int i = 0; i < outputs->count; ++i)
@@ -119,6 +134,14 @@ bool outputs_have(const Outputs *outputs, OutputKind kind)
         if (outputs->list[i].kind == kind)
             return true;
     return false;
+}
+
+bool outputs_hold_one(const Outputs *outputs)
+{
+    for (int i = 0; i < outputs->count; ++i)
+        if (outputs->list[i].kind != OUTPUT_IMAGE || outputs->list[i].pattern.numbered)
+            return false;
+    return true;
 }
 
 bool outputs_idle(const Outputs *outputs)
@@ -162,7 +185,7 @@ static int check_output(const Outputs *outputs, const Output *output, int (*numb
     if (output->kind == OUTPUT_NULL || output->kind == OUTPUT_MD5 || output->kind == OUTPUT_STDOUT)
         return CODE_DONE;
     char name[PATH_SIZE];
-    if (output->kind == OUTPUT_VIDEO)
+    if (output->kind == OUTPUT_VIDEO || output->kind == OUTPUT_ARRAY)
     {
         int code = check_folder(output->text);
         return code ? code : check_file(outputs, output->text);
@@ -195,6 +218,28 @@ int outputs_check(Outputs *outputs, int (*number)(const void *context, int index
             return code;
     }
     return CODE_DONE;
+}
+
+static bool output_complete(const Output *output, int (*number)(const void *context, int index), const void *context,
+                            int count)
+{
+    char name[PATH_SIZE];
+    bool files = output->kind == OUTPUT_IMAGE || output->kind == OUTPUT_FLOW;
+    if (output->kind == OUTPUT_VIDEO)
+        return access(output->text, F_OK) == 0;
+    for (int i = 0; i < (output->pattern.numbered ? count : 1) && files; ++i)
+        if (!pattern_name(&output->pattern, number(context, i), NULL, NULL, name) || access(name, F_OK) != 0)
+            return false;
+    return files;
+}
+
+bool outputs_complete(const Outputs *outputs, int (*number)(const void *context, int index), const void *context,
+                      int count)
+{
+    for (int i = 0; i < outputs->count; ++i)
+        if (!output_complete(&outputs->list[i], number, context, count))
+            return false;
+    return true;
 }
 
 /// The video if it is open or could be opened. Without an encoder beside other outputs the run goes on.
@@ -317,6 +362,7 @@ static int write_one(Outputs *outputs, Output *output, int frame, const RfImage 
         return frame_pnm(pixels, layout);
     case OUTPUT_NULL:
     case OUTPUT_FLOW:
+    case OUTPUT_ARRAY:
         break;
     }
     return CODE_DONE;
@@ -331,23 +377,38 @@ int outputs_write(Outputs *outputs, int frame, const RfImage *pixels, const Layo
     return code;
 }
 
+static int write_flow_file(const Outputs *outputs, const Output *output, int frame, const RfFlowView *flow)
+{
+    char name[PATH_SIZE];
+    if (!pattern_name(&output->pattern, frame, NULL, NULL, name))
+        return fail(CODE_USAGE, NULL, NULL, "an output's name is longer than %d characters", PATH_SIZE - 1);
+    int code = check_file(outputs, name);
+    RfResult result = code ? RF_OK : rf_flow_write(name, flow, (float)outputs->settings->fps);
+    return result == RF_OK ? code : fail_result(result, name);
+}
+
+static int write_array(const Outputs *outputs, Output *output, const RfFlowView *flow)
+{
+    RfResult result = RF_OK;
+    if (!output->array)
+        result = rf_flow_array_open(output->text, flow->width, flow->height, outputs->count_of_frames, &output->array);
+    if (result == RF_OK)
+        result = rf_flow_array_write(output->array, flow);
+    return result == RF_OK ? CODE_DONE : fail_result(result, output->text);
+}
+
 int outputs_write_flow(Outputs *outputs, int frame, const RfFlowView *flow)
 {
     int code = CODE_DONE;
     for (int i = 0; i < outputs->count && !code; ++i)
     {
-        const Output *output = &outputs->list[i];
-        char name[PATH_SIZE];
+        Output *output = &outputs->list[i];
         if (output->kind == OUTPUT_MD5)
             code = flow_md5(flow, frame);
-        if (output->kind != OUTPUT_FLOW)
-            continue;
-        if (!pattern_name(&output->pattern, frame, NULL, NULL, name))
-            return fail(CODE_USAGE, NULL, NULL, "an output's name is longer than %d characters", PATH_SIZE - 1);
-        code = check_file(outputs, name);
-        RfResult result = code ? RF_OK : rf_flow_write(name, flow, (float)outputs->settings->fps);
-        if (result != RF_OK)
-            code = fail_result(result, name);
+        else if (output->kind == OUTPUT_FLOW)
+            code = write_flow_file(outputs, output, frame, flow);
+        else if (output->kind == OUTPUT_ARRAY)
+            code = write_array(outputs, output, flow);
     }
     return code;
 }
@@ -381,7 +442,12 @@ int outputs_close(Outputs *outputs, bool keep)
     {
         Output *output = &outputs->list[i];
         RfResult result = rf_video_close(output->video, keep && !code);
+        if (result == RF_OK)
+            result = rf_flow_array_close(output->array, keep && !code);
+        else
+            rf_flow_array_close(output->array, false);
         output->video = NULL;
+        output->array = NULL;
         if (result != RF_OK && keep && !code)
             code = fail_result(result, output->text);
     }

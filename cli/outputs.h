@@ -12,6 +12,8 @@ typedef enum OutputKind
 {
     OUTPUT_IMAGE,
     OUTPUT_FLOW,
+    /// All moments of a flow in one file.
+    OUTPUT_ARRAY,
     OUTPUT_VIDEO,
     OUTPUT_NULL,
     OUTPUT_MD5,
@@ -24,6 +26,7 @@ typedef struct Output
     const char *text;
     Pattern pattern;
     RfVideo *video;
+    RfFlowArray *array;
     /// Of the open video.
     int width, height;
     /// There is no encoder: the frames go on, the run ends with this fault.
@@ -38,6 +41,8 @@ typedef struct Outputs
     const InputFiles *inputs;
     /// What is there may be replaced: -y, or a resumed run's own frames.
     bool replace;
+    /// Of frames, once the outputs are gathered.
+    int count_of_frames;
     /// A failure to report at the end of a run that went on without a video.
     bool video_missing;
     Fault missing;
@@ -46,12 +51,19 @@ typedef struct Outputs
 /// Finds what each output is; `flows` says that fields are written, not pictures. The inputs must outlive the outputs.
 int outputs_open(Outputs *outputs, const Settings *settings, const char *destination, bool flows,
                  const InputFiles *inputs);
+/// With `count` frames to come: one .npy for many moments of a flow takes them all. These cannot be resumed.
+int outputs_gather(Outputs *outputs, int count);
 /// Refuses what cannot work before anything is computed: one name for many frames, files that exist, inputs, folders
 /// that do not. `number(context, i)` is the i-th frame written, of `count`.
 int outputs_check(Outputs *outputs, int (*number)(const void *context, int index), const void *context, int count);
+/// True if every file of the run is there: what `--resume` finds behind a run that came to its end.
+bool outputs_complete(const Outputs *outputs, int (*number)(const void *context, int index), const void *context,
+                      int count);
 /// The first image output, NULL if there is none.
 const Output *outputs_first_image(const Outputs *outputs);
 bool outputs_have(const Outputs *outputs, OutputKind kind);
+/// Images alone, each of one name without a number: room for one frame.
+bool outputs_hold_one(const Outputs *outputs);
 /// Only null:, so that nothing is gained by writing while computing.
 bool outputs_idle(const Outputs *outputs);
 

@@ -163,6 +163,17 @@ void progress_done(Progress *progress)
                 1e3 * progress->first_seconds, peak_mib(), rf_threads());
 }
 
+void progress_nothing_left(const Settings *settings, int total)
+{
+    Progress progress;
+    progress_begin(&progress, settings, total, total);
+    if (progress.kind == PROGRESS_JSON)
+        progress_done(&progress);
+    else if (progress.kind != PROGRESS_NONE)
+        fprintf(stderr, "nothing is left to do: %s there, and no stopped run; -y without --resume starts afresh\n",
+                total == 1 ? "the frame is" : "all frames are");
+}
+
 void warn(const Settings *settings, const char *file, const char *format, ...)
 {
     if (settings->quiet || (settings->progress == PROGRESS_NONE))

@@ -31,6 +31,9 @@ void progress_frame(Progress *progress, int frame, double seconds, const Stage *
 void progress_clear(Progress *progress);
 void progress_done(Progress *progress);
 
+/// In place of a run whose frames are all there.
+void progress_nothing_left(const Settings *settings, int total);
+
 /// One line that is no failure. `file` may be NULL.
 __attribute__((format(printf, 3, 4))) void warn(const Settings *settings, const char *file, const char *format, ...);
 /// The same, with -v only.

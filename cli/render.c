@@ -204,13 +204,23 @@ static int render_flow(Render *render, const InputFiles *inputs, Outputs *output
         code = plan_of_flow(settings, render->flow.flow, settings->words[0], &plan);
     if (code)
         return code;
+    // A steady flow looks the same in every frame: one name takes one of them.
+    if (render->flow.info.moment_count == 1 && !settings->frames_given && outputs_hold_one(outputs))
+        plan.count = 1;
     render->width = settings->width ? settings->width : render->flow.info.width;
     render->height = settings->height ? settings->height : render->flow.info.height;
+    flow_input_warn_of_size(&render->flow, settings, render->width, render->height);
     render->picture = rf_flow_picture_defaults();
     render->picture.picture = pictures[settings->picture];
     render->picture.seed = settings->seed;
     // One scale for the whole run, so that colours do not flicker from frame to frame.
-    render->picture.full_speed = settings->full_speed > 0 ? (float)settings->full_speed : render->flow.info.max_speed;
+    render->picture.full_speed = (float)settings->full_speed;
+    if (settings->full_speed == 0)
+        code = flow_input_greatest(&render->flow, plan.first, plan_number(&plan, plan.count - 1),
+                                   &render->picture.full_speed);
+    if (code)
+        return code;
+    tell(settings, "full speed: %.4g cells a frame", (double)render->picture.full_speed);
     source.hash = hash_settings(render, inputs);
     code = flow_input_hash(&render->flow, settings, plan.first, &source.hash);
     return code ? code : run_frames(settings, &plan, &source, outputs);

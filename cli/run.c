@@ -71,6 +71,8 @@ typedef struct Run
     /// Frames written by this run, and whether it continued another.
     int written;
     bool resumed;
+    /// --resume, and there is nothing left to do.
+    bool finished;
 } Run;
 
 static int drawn_number(const void *context, int index)
@@ -290,13 +292,20 @@ static int replay(Run *run, int first)
 static int prepare(Run *run, int *first)
 {
     char name[PATH_SIZE];
+    int code = outputs_gather(run->outputs, plan_drawn_count(run->plan));
     const Output *image = outputs_first_image(run->outputs);
-    int code = CODE_DONE;
-    if (image && pattern_name(&image->pattern, plan_number(run->plan, 0), NULL, NULL, name))
+    if (image && !outputs_have(run->outputs, OUTPUT_ARRAY) &&
+        pattern_name(&image->pattern, plan_number(run->plan, 0), NULL, NULL, name))
         run->stateful = state_place(&run->state, name);
     run->state.hash = run->source->hash;
+    if (code)
+        return code;
     if (run->settings->resume && run->stateful && state_exists(&run->state))
         code = resume(run, first);
+    else if (run->settings->resume && !run->outputs->replace)
+        run->finished = outputs_complete(run->outputs, drawn_number, run->plan, plan_drawn_count(run->plan));
+    if (run->finished)
+        return code;
     run->outputs->replace = run->outputs->replace || run->resumed;
     if (!code)
         code = outputs_check(run->outputs, drawn_number, run->plan, plan_drawn_count(run->plan));
@@ -369,7 +378,10 @@ int run_frames(const Settings *settings, const FramePlan *plan, const FrameSourc
     int first = 0;
     int code = prepare(run, &first);
     setup_end();
-    code = code ? code : close_run(run, run_prepared(run, first));
+    if (run->finished)
+        progress_nothing_left(settings, plan_drawn_count(plan));
+    else
+        code = code ? code : close_run(run, run_prepared(run, first));
     for (int i = 0; i < 2; ++i)
     {
         rf_image_destroy(run->slots[i].pixels);

@@ -56,7 +56,8 @@ void outputs_sweep(const Outputs *outputs)
     for (int i = 0; i < outputs->count; ++i)
     {
         const Output *output = &outputs->list[i];
-        if (output->kind != OUTPUT_IMAGE && output->kind != OUTPUT_FLOW && output->kind != OUTPUT_VIDEO)
+        if (output->kind != OUTPUT_IMAGE && output->kind != OUTPUT_FLOW && output->kind != OUTPUT_ARRAY &&
+            output->kind != OUTPUT_VIDEO)
             continue;
         char folder[PATH_SIZE];
         snprintf(folder, sizeof folder, "%.*s", (int)(text_base_name(output->text) - output->text), output->text);

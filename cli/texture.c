@@ -185,6 +185,8 @@ static void tell_texture(const Texture *texture, const FramePlan *plan)
     tell(settings, "method: %s, frames %d to %d, %d x %d pixels, %s, %d threads", texture->method->name,
          plan_number(plan, 0), plan_number(plan, plan->count - 1), texture->width, texture->height, rf_simd_name(),
          rf_threads());
+    flow_input_warn_of_size(&texture->flow, settings, texture->width, texture->height);
+    flow_input_warn_of_speed(&texture->flow, settings);
     if (info->filled_vectors > 0)
         warn(settings, settings->words[0], "%d invalid vectors were filled from their neighbours",
              info->filled_vectors);

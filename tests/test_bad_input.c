@@ -2,8 +2,7 @@
 // Broken files and wrong command lines: each gives its exit code and one line that says what and where, and leaves
 // nothing half-written.
 #include "riffle/riffle.h"
-#include "support/command.h"
-#include "support/files.h"
+#include "support/cli_check.h"
 #include "support/flow_files.h"
 
 #include <math.h>
@@ -17,8 +16,6 @@
 #include <zlib.h>
 
 #include <cmocka.h>
-
-#define PROGRAM RF_BUILD_DIR "/riffle"
 
 typedef struct Case
 {
@@ -314,11 +311,11 @@ static void unusable_exemplars_are_refused_with_what_to_do(void **state)
         {FLOW "builtin:fudge outputs/a.png --frames 1", 3,
          "builtin:fudge: there is no built-in exemplar of that name; there are: "},
         {FLOW "builtin:foam?size=0 outputs/a.png --frames 1", 3, "builtin:foam?size=0:size: "},
-        {FLOW "good.png outputs/a.png --map rough=missing.png", 3, "missing.png: "},
-        {FLOW "good.png outputs/a.png --map rough=small.png", 3, "small.png:rough: this map is 16 x 16 pixels"},
+        {FLOW "good.png outputs/a.png --map roughness=missing.png", 3, "missing.png: "},
+        {FLOW "good.png outputs/a.png --map roughness=small.png", 3, "small.png:roughness: this map is 16 x 16 pixels"},
         {FLOW "good.png outputs/a.png --map normal=small.png", 3, "small.png:normal: "},
-        {FLOW "good.png outputs/a.png --map rough=nan.exr", 3, "nan.exr:pixel (8, 16), channel R: is NaN"},
-        {FLOW "good.png outputs/a.png --map-weight rough=1", 2, "there is no such map; there are: colour"},
+        {FLOW "good.png outputs/a.png --map roughness=nan.exr", 3, "nan.exr:pixel (8, 16), channel R: is NaN"},
+        {FLOW "good.png outputs/a.png --map-weight roughness=1", 2, "there is no such map; there are: colour"},
         {FLOW "good.png outputs/a.png --mask black.pgm", 3, "black.pgm: the mask is black everywhere"},
         {FLOW "good.png outputs/a.png --mask missing.pgm", 3, "missing.pgm: "},
     };

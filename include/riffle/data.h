@@ -113,6 +113,9 @@ RF_API int rf_exemplar_width(const RfExemplar *exemplar);
 RF_API int rf_exemplar_height(const RfExemplar *exemplar);
 RF_API int rf_exemplar_channels(const RfExemplar *exemplar);
 RF_API bool rf_exemplar_tiles(const RfExemplar *exemplar);
+/// How rough the borders are where opposite ones meet, over the inside: the mean square of second differences, of the
+/// rougher pair of borders. About 1 where the exemplar continues; RF_TILING_AUTO takes up to 1.5 as tiling.
+RF_API float rf_exemplar_border_roughness(const RfExemplar *exemplar);
 RF_API int rf_exemplar_map_count(const RfExemplar *exemplar);
 /// The map as it was given; `image` is a view into the exemplar's own pixels, and first_channel (may be NULL) its place
 /// in a frame.

@@ -66,6 +66,9 @@ typedef struct RfFlowInfo
     /// The frame of the last moment: first_frame + (moment_count - 1) * moment_every. For steady and endless flows
     /// first_frame + 99.
     int last_frame;
+    /// What the numbers of the files go up by from one to the next, 0 where that changes. They are no times: file n is
+    /// moment n, and a missing number is passed over. 1 where there are no numbers.
+    int number_step;
     bool has_mask;
     /// Vectors marked invalid in the first moment and filled from their neighbours.
     int filled_vectors;
@@ -91,6 +94,16 @@ RF_API RF_MUST_USE RfResult rf_flow_at(RfFlow *flow, int frame, RfFlowView *out)
 /// units a second, y up, cell size 1, at `fps` frames a second). The mask is written where the format can (.vti), else
 /// zero velocity marks the land.
 RF_API RF_MUST_USE RfResult rf_flow_write(const char *path, const RfFlowView *view, float fps);
+
+/// Several moments of one size being written to one .npy ([T, H, W, 2]), in the order of time.
+typedef struct RfFlowArray RfFlowArray;
+
+RF_API RF_MUST_USE RfResult rf_flow_array_open(const char *path, int width, int height, int moments, RfFlowArray **out);
+/// Land is written as zero velocity.
+RF_API RF_MUST_USE RfResult rf_flow_array_write(RfFlowArray *array, const RfFlowView *view);
+/// Finishes and renames the file once all moments are there; on failure, and when `keep` is false, nothing stays. Frees
+/// the array in every case; accepts NULL.
+RF_API RfResult rf_flow_array_close(RfFlowArray *array, bool keep);
 
 // ---- built-in inputs ---------------------------------------------------------------------------------------------
 

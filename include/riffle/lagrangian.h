@@ -27,9 +27,9 @@ typedef struct RfLagrangianOptions
     /// Same seed and same input: same bytes, with any number of threads. Default 1.
     uint64_t seed;
 
-    /// Poisson-disk radius d, in output pixels, 2 to 4096; 0 picks 64, or less where the exemplar is small. Smaller
-    /// follows the flow closer and blends more; cost grows as 1 / d^2. An exemplar that does not tile must measure 3.9
-    /// d; a larger d is refused with the one that fits.
+    /// Poisson-disk radius d, in output pixels, 2 to 4096; 0 picks 64, or less where the exemplar's shorter side is
+    /// under 3.9 d, or 2.6 d if it tiles. Smaller follows the flow closer and blends more; cost grows as 1 / d^2. An
+    /// exemplar that does not tile must measure 3.9 d; a larger d is refused with the one that fits.
     float particle_radius;
 
     /// Vertices along a side of a grid, 4 to 32. Default 8. More follow fine motion; cost grows as its square.

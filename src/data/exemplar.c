@@ -88,12 +88,19 @@ static double roughness(const RfExemplar *exemplar, bool along_x, bool border)
     return sum / (double)count;
 }
 
+float rf_exemplar_border_roughness(const RfExemplar *exemplar)
+{
+    // Keeps constant exemplars, whose differences are rounding, at 1.
+    const double noise = 1e-10;
+    double across = (roughness(exemplar, true, true) + noise) / (roughness(exemplar, true, false) + noise);
+    double down = (roughness(exemplar, false, true) + noise) / (roughness(exemplar, false, false) + noise);
+    return (float)fmax(across, down);
+}
+
 static bool looks_tileable(const RfExemplar *exemplar)
 {
     // A border as rough as half again the inside still reads as continuous.
-    const double limit = 1.5, noise = 1e-10;
-    return roughness(exemplar, true, true) <= limit * roughness(exemplar, true, false) + noise &&
-           roughness(exemplar, false, true) <= limit * roughness(exemplar, false, false) + noise;
+    return rf_exemplar_border_roughness(exemplar) <= 1.5f;
 }
 
 RfResult rf_exemplar_create(const RfMapView *maps, int map_count, RfTiling tiling, RfExemplar **out)

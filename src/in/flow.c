@@ -287,10 +287,21 @@ static void measure_speed(const RfFlowField *field, RfFlowInfo *info)
     info->mean_speed = (float)(sum / (double)cells);
 }
 
+static int number_step(const RfSequence *sequence)
+{
+    int count = sequence ? rf_sequence_count(sequence) : 0;
+    int step = count > 1 ? rf_sequence_number(sequence, 1) - rf_sequence_number(sequence, 0) : 1;
+    for (int i = 2; i < count; ++i)
+        if (rf_sequence_number(sequence, i) - rf_sequence_number(sequence, i - 1) != step)
+            return 0;
+    return step;
+}
+
 static RfResult count_moments(RfFlow *flow, const RfFlowMoment *first)
 {
     RfFlowInfo *info = &flow->info;
     info->first_frame = 1;
+    info->number_step = number_step(flow->sequence);
     info->moment_count = first->moment_count;
     if (file_count(flow) > 0)
         info->moment_count = file_count(flow);

@@ -34,8 +34,9 @@ RfColour rf_flow_colour(RfVec2 velocity, float full_speed)
         return (RfColour){1, 1, 1};
     float turn = atan2f(-velocity.y, -velocity.x) / RF_PI;
     RfColour hue = wheel_hue(rf_clamp(0.5f * (turn + 1) * HUES, 0, HUES - 1e-4f));
-    // The database's own code darkens what is out of range by a quarter.
-    return radius <= 1 ? rf_colour_mix((RfColour){1, 1, 1}, hue, radius) : rf_colour_scale(hue, 0.75f);
+    // The database's own code darkens what is out of range by a quarter. Full speed itself may come out of the
+    // interpolation a rounding error too fast.
+    return radius < 1.0001f ? rf_colour_mix((RfColour){1, 1, 1}, hue, fminf(radius, 1)) : rf_colour_scale(hue, 0.75f);
 }
 
 static void draw_wheel_band(void *context, int item, int worker)
