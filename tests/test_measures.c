@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "core/maths.h"
 #include "core/memory.h"
 #include "core/random.h"
 #include "data/exemplar.h"
@@ -11,6 +12,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -199,6 +201,56 @@ static void motions_of_eight_pixels_are_found(void **state)
     assert_true(judge(g_texture, g_frame).error < 0.05);
 }
 
+// A 256 x 256 picture of the exemplar, mirrored where it is smaller, and the same carried by vortices of 8 pixels a
+// frame.
+static double floor_at_8_pixels(const char *name, RfMeasureEstimator estimator)
+{
+    enum
+    {
+        SIDE = 256,
+        COUNT = SIDE * SIDE
+    };
+    static float filled[COUNT], carried[COUNT], velocity[2 * COUNT], displacement[2 * COUNT], backward[2 * COUNT];
+    RfImage *image = NULL;
+    assert_int_equal(rf_image_read(name, &image), RF_OK);
+    RfImageView picture = rf_image_view(image);
+    float *grey = malloc((size_t)picture.width * (size_t)picture.height * sizeof(float));
+    rf_measure_grey(&picture, grey);
+    for (int k = 0; k < COUNT; ++k)
+        filled[k] =
+            grey[rf_mirror_int(k / SIDE, picture.height) * picture.width + rf_mirror_int(k % SIDE, picture.width)];
+    scene_two_vortices(SIDE, SIDE, 5, velocity);
+    float fastest = 0;
+    for (int k = 0; k < COUNT; ++k)
+        fastest = fmaxf(fastest, hypotf(velocity[2 * k], velocity[2 * k + 1]));
+    for (int k = 0; k < 2 * COUNT; ++k)
+        velocity[k] *= 8 / fastest;
+    RfFlowView flow = {.width = SIDE, .height = SIDE, .velocity = velocity, .time = 1};
+    rf_measure_displacement(&flow, 0, SIDE, SIDE, displacement);
+    assert_int_equal(rf_measure_invert(displacement, SIDE, SIDE, backward), RF_OK);
+    assert_int_equal(rf_measure_warp(filled, backward, SIDE, SIDE, carried), RF_OK);
+    RfFramePair pair = {SIDE, SIDE, filled, carried, NULL, NULL};
+    RfMeasureFlow result;
+    assert_int_equal(rf_measure_flow_error(estimator, &pair, displacement, NULL, NULL, NULL, &result), RF_OK);
+    free(grey);
+    rf_image_destroy(image);
+    return result.error;
+}
+
+static void at_8_pixels_a_frame_textures_are_followed_to_less_than_a_seventh_of_a_pixel(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"builtin:foam", "builtin:noise", "builtin:lava", "builtin:pebbles",
+                                        "builtin:bubbles"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; ++i)
+    {
+        double dis = floor_at_8_pixels(names[i], RF_MEASURE_INVERSE_SEARCH);
+        double fine = floor_at_8_pixels(names[i], RF_MEASURE_LUCAS_KANADE);
+        print_message("%-16s 8 px: inverse search %.3f px, Lucas and Kanade %.3f px\n", names[i], dis, fine);
+        assert_true(dis < 0.14 && fine < 0.14);
+    }
+}
+
 static void a_frozen_texture_and_another_texture_fail_the_flow_error(void **state)
 {
     (void)state;
@@ -308,6 +360,7 @@ int main(void)
         cmocka_unit_test(splines_go_through_their_samples_and_follow_a_sine),
         cmocka_unit_test(the_flow_of_a_warped_texture_is_found_to_a_small_fraction_of_a_pixel),
         cmocka_unit_test(motions_of_eight_pixels_are_found),
+        cmocka_unit_test(at_8_pixels_a_frame_textures_are_followed_to_less_than_a_seventh_of_a_pixel),
         cmocka_unit_test(a_frozen_texture_and_another_texture_fail_the_flow_error),
         cmocka_unit_test(land_does_not_count),
         cmocka_unit_test(a_spectrum_is_at_no_distance_from_itself_and_far_from_white_noise),

@@ -470,15 +470,15 @@ static void relax(const Solver *s)
 static void refine(Solver *s)
 {
     size_t bytes = (size_t)s->level->w * (size_t)s->level->h * sizeof(float);
-    int h = s->level->h;
+    int w = s->level->w, h = s->level->h;
     memcpy(s->flow.u, s->start.u, bytes);
     memcpy(s->flow.v, s->start.v, bytes);
-    rf_measure_rows(h, carry_rows, s);
-    rf_measure_rows(h, first_derivative_rows, s);
-    rf_measure_rows(h, second_derivative_rows, s);
+    rf_measure_rows(w, h, carry_rows, s);
+    rf_measure_rows(w, h, first_derivative_rows, s);
+    rf_measure_rows(w, h, second_derivative_rows, s);
     for (int i = 0; i < FIXED_POINT_ITERATIONS; ++i)
     {
-        rf_measure_rows(h, weigh_rows, s);
+        rf_measure_rows(w, h, weigh_rows, s);
         for (int j = 0; j < RELAXATIONS; ++j)
             relax(s);
     }
@@ -508,7 +508,7 @@ static void enlarge(Solver *s)
     size_t bytes = (size_t)s->level[1].w * (size_t)s->level[1].h * sizeof(float);
     memcpy(s->start.u, s->flow.u, bytes);
     memcpy(s->start.v, s->flow.v, bytes);
-    rf_measure_rows(s->level->h, enlarge_rows, s);
+    rf_measure_rows(s->level->w, s->level->h, enlarge_rows, s);
 }
 
 static bool add_level(Solver *s, const RfFramePair *pair, int w, int h, RfArena *arena)
@@ -584,7 +584,7 @@ RfResult rf_measure_inverse_search(const RfFramePair *pair, float *flow)
         if (l < FINEST_LEVEL)
             continue;
         rf_parallel_for(patches_along(s.level->h), search_row, &s);
-        rf_measure_rows(s.level->h, gather_rows, &s);
+        rf_measure_rows(s.level->w, s.level->h, gather_rows, &s);
         refine(&s);
     }
     for (size_t k = 0; k < (size_t)pair->w * (size_t)pair->h; ++k)

@@ -299,10 +299,10 @@ static void solve_level(Solver *s, int l)
     rf_spline_prefilter(s->spline, s->w, s->h, 1);
     for (int i = 0; i < (l == 0 ? LAST_ITERATIONS : ITERATIONS); ++i)
     {
-        rf_measure_rows(s->h, warp_rows, s);
-        rf_measure_rows(s->h, tensor_rows, s);
-        rf_measure_rows(s->h, solve_rows, s);
-        rf_measure_rows(s->h, median_rows, s);
+        rf_measure_rows(s->w, s->h, warp_rows, s);
+        rf_measure_rows(s->w, s->h, tensor_rows, s);
+        rf_measure_rows(s->w, s->h, solve_rows, s);
+        rf_measure_rows(s->w, s->h, median_rows, s);
     }
     memcpy(s->next_u, s->u, bytes);
     memcpy(s->next_v, s->v, bytes);

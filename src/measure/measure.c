@@ -3,7 +3,8 @@
 // measure, and sums up.
 //
 // Holes are counted by the coverage and by nothing else: they, and land, are filled smoothly from what is round them
-// before anything looks at the grey picture, so that they are no edges, and pixels within them do not count.
+// before anything looks at the grey picture, so that they are no edges, and pixels in them do not count. Spectra are
+// taken from crops without any, or, where every crop has some, from the filled picture.
 #include "riffle/measure.h"
 
 #include "core/maths.h"
@@ -13,6 +14,7 @@
 #include "core/result.h"
 #include "data/flow_field.h"
 #include "measure/judgement.h"
+#include "measure/patches.h"
 #include "measure/quantities.h"
 #include "measure/spectrum.h"
 
@@ -42,6 +44,8 @@ struct RfMeasure
     RfMeasureHoles holes;
     RfMeasureContrast contrast_floor;
     RfSpectrometer *spectrometer;
+    RfPatchJudge *patches;
+    int64_t use[RF_MEASURE_USE_CELLS * RF_MEASURE_USE_CELLS];
     RfRadialSpectrum spectrum;
 
     int width, height, channels;
@@ -207,6 +211,7 @@ void rf_measure_destroy(RfMeasure *m)
     rf_release(m->fluid);
     rf_release(m->displacement);
     rf_spectrometer_destroy(m->spectrometer);
+    rf_patches_destroy(m->patches);
     rf_release(m->exemplar.pixels);
     rf_release(m->exemplar_grey);
     rf_release(m);
@@ -314,7 +319,8 @@ static RfResult judge_motion(RfMeasure *m, const RfFlowView *flow, const Frame *
     return RF_OK;
 }
 
-// Not from holes: those are filled, and their shares would be smooth.
+// Crops without holes, if there are any: a filled hole is smooth, and its rim is not, which shows in the frequencies
+// that the texture does not have.
 static RfResult judge_spectrum(RfMeasure *m, const Frame *now, RfMeasureFrame *out)
 {
     RfGrey frame = {now->grey, m->width, m->height};
@@ -323,7 +329,68 @@ static RfResult judge_spectrum(RfMeasure *m, const Frame *now, RfMeasureFrame *o
     if (!m->spectrometer)
         RF_TRY(rf_spectrometer_create(m->exemplar_grey ? &exemplar : NULL, &frame, mask, m->options.spectrum_crop,
                                       m->options.spectrum_first, m->options.seed, &m->spectrometer));
+    RF_TRY(rf_spectrometer_measure(m->spectrometer, &frame, now->all_known ? NULL : now->known, &m->spectrum,
+                                   &out->spectrum));
+    bool some = out->coverage.holes > 0 && out->coverage.holes < out->coverage.fluid;
+    if (!some || !isnan(m->spectrum.power[1]))
+        return RF_OK;
     return rf_spectrometer_measure(m->spectrometer, &frame, mask, &m->spectrum, &out->spectrum);
+}
+
+// Colour alone, or grey, packed: what windows are compared in.
+static void pack(const RfImageView *frame, const float *grey, const RfImageView *out)
+{
+    for (int y = 0; y < out->height; ++y)
+        for (int x = 0; x < out->width; ++x)
+        {
+            const float *p = frame->pixels + (ptrdiff_t)y * frame->row_stride + (ptrdiff_t)x * frame->channels;
+            float *q = out->pixels + (ptrdiff_t)y * out->row_stride + (ptrdiff_t)x * out->channels;
+            if (out->channels == 3)
+                memcpy(q, p, 3 * sizeof *q);
+            else
+                *q = grey[(size_t)y * (size_t)out->width + (size_t)x] / 255;
+        }
+}
+
+static RfResult pack_new(const RfImageView *picture, const float *grey, int channels, RfImageView *out)
+{
+    *out = *picture;
+    out->channels = channels;
+    out->row_stride = (ptrdiff_t)channels * out->width;
+    out->pixels = rf_allocate((size_t)out->width * (size_t)out->height, (size_t)channels * sizeof(float));
+    if (!out->pixels)
+        return RF_OUT_OF_MEMORY;
+    pack(picture, grey, out);
+    return RF_OK;
+}
+
+static RfResult make_patches(RfMeasure *m, int channels)
+{
+    RfImageView exemplar;
+    RF_TRY(pack_new(&m->exemplar, m->exemplar_grey, channels, &exemplar));
+    RfResult result = rf_patches_create(&exemplar, m->options.patch_size, m->options.patch_stride, m->options.rotations,
+                                        m->options.half_pixel, &m->patches);
+    rf_release(exemplar.pixels);
+    return result;
+}
+
+static RfResult judge_patches(RfMeasure *m, const RfImageView *frame, const Frame *now, RfMeasureFrame *out)
+{
+    int size = m->options.patch_size;
+    if (!m->exemplar_grey || m->options.patch_every == 0 || m->frames_seen % m->options.patch_every != 0 ||
+        m->width < size || m->height < size)
+        return RF_OK;
+    int channels = m->options.patch_colour && m->exemplar.channels == 3 && m->channels >= 3 ? 3 : 1;
+    if (!m->patches)
+        RF_TRY(make_patches(m, channels));
+    RfImageView packed;
+    RF_TRY(pack_new(frame, now->grey, channels, &packed));
+    RfResult result =
+        rf_patches_measure(m->patches, &packed, now->all_known ? NULL : now->known, m->maps[RF_MEASURE_MAP_PATCH],
+                           m->maps[RF_MEASURE_MAP_SOURCE], m->use, &out->patch);
+    m->has_map[RF_MEASURE_MAP_PATCH] = m->has_map[RF_MEASURE_MAP_SOURCE] = result == RF_OK;
+    rf_release(packed.pixels);
+    return result;
 }
 
 static void judge_contrast(const RfMeasure *m, const RfImageView *frame, const Frame *now, RfMeasureFrame *out)
@@ -362,6 +429,7 @@ RfResult rf_measure_step(RfMeasure *m, const RfFlowView *flow, const uint8_t *ma
     if (moved)
         RF_TRY(judge_motion(m, flow, before, now, &result));
     RF_TRY(judge_spectrum(m, now, &result));
+    RF_TRY(judge_patches(m, frame, now, &result));
     judge_contrast(m, frame, now, &result);
 
     // From here on nothing fails.
@@ -405,6 +473,11 @@ void rf_measure_spectra(const RfMeasure *m, RfMeasureSpectra *out)
     to_decibels(low.power, 1, out->low);
     to_decibels(high.power, 1, out->high);
     to_decibels(m->power_sum, m->spectra_seen ? 1 / (double)m->spectra_seen : (double)NAN, out->all_frames);
+}
+
+void rf_measure_use(const RfMeasure *m, int64_t counts[RF_MEASURE_USE_CELLS * RF_MEASURE_USE_CELLS])
+{
+    memcpy(counts, m->use, sizeof m->use);
 }
 
 bool rf_measure_has_map(const RfMeasure *m, RfMeasureMap map)

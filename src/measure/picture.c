@@ -10,6 +10,12 @@
 
 #include <string.h>
 
+enum
+{
+    /// Pixels of a walk that takes longer than threads take to wake.
+    WORTH_THREADS = 1 << 15
+};
+
 typedef struct Rows
 {
     RfRowsFn *function;
@@ -24,8 +30,13 @@ static void run_band(void *context, int item, int worker)
     rows->function(rows->context, y0, rf_min_int(y0 + RF_MEASURE_BAND, rows->h), worker);
 }
 
-void rf_measure_rows(int h, RfRowsFn *function, void *context)
+void rf_measure_rows(int w, int h, RfRowsFn *function, void *context)
 {
+    if ((int64_t)w * h < WORTH_THREADS)
+    {
+        function(context, 0, h, 0);
+        return;
+    }
     Rows rows = {function, context, h};
     rf_parallel_for((h + RF_MEASURE_BAND - 1) / RF_MEASURE_BAND, run_band, &rows);
 }
@@ -87,7 +98,7 @@ static void displace_rows(void *context, int y0, int y1, int worker)
 void rf_measure_displacement(const RfFlowView *view, double from, int w, int h, float *displacement)
 {
     Displace d = {view, from, w, h, displacement};
-    rf_measure_rows(h, displace_rows, &d);
+    rf_measure_rows(w, h, displace_rows, &d);
 }
 
 // What a spline is sampled at, and where to.
@@ -144,7 +155,7 @@ static RfResult resample(const float *in, const float *offset, int w, int h, int
     memcpy(spline, in, count * sizeof(float));
     rf_spline_prefilter(spline, w, h, channels);
     Resample r = {spline, offset, w, h, out};
-    rf_measure_rows(h, rows, &r);
+    rf_measure_rows(w, h, rows, &r);
     rf_release(spline);
     return RF_OK;
 }

@@ -43,6 +43,6 @@ enum
 /// counted[k] = 1 where pixel k of a, and where it moves in b, are RF_MEASURE_BORDER pixels from border and mask.
 RfResult rf_measure_counted(const RfFramePair *pair, const float *displacement, uint8_t *counted);
 
-/// Calls function(context, y0, y1, worker) for bands of rows, in parallel.
+/// Calls function(context, y0, y1, worker) for bands of rows of w pixels, in parallel where that pays.
 typedef void RfRowsFn(void *context, int y0, int y1, int worker);
-void rf_measure_rows(int h, RfRowsFn *function, void *context);
+void rf_measure_rows(int w, int h, RfRowsFn *function, void *context);

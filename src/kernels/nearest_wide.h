@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// The loops of nearest.c for one instruction set. Included once for each, with
+//
+//   SET(name)          the name's form for this set
+//   TARGET             the attribute that turns the set on
+//   WIDTH, Vector      floats in a vector, and its type (any float's alignment will do)
+//   ROWS               queries of a tile in one go: 2 * ROWS sums, 2 numbers of a candidate, 1 of a query fit the
+//   registers LEAST(a, b)        the lesser, number by number BELOW(a, limit)    bit i: a[i] <= limit[i]
+
+TARGET static inline __attribute__((always_inline)) void SET(tile_piece)(const float *queries, const float *candidates,
+                                                                         int numbers, const float *start, float *out,
+                                                                         ptrdiff_t stride)
+{
+    Vector left[ROWS], right[ROWS];
+#pragma GCC unroll 12
+    for (int q = 0; q < ROWS; ++q)
+    {
+        left[q] = *(const Vector *)start;
+        right[q] = *(const Vector *)(start + WIDTH);
+    }
+    for (int k = 0; k < numbers; ++k)
+    {
+        Vector l = *(const Vector *)candidates, r = *(const Vector *)(candidates + WIDTH);
+#pragma GCC unroll 12
+        for (int q = 0; q < ROWS; ++q)
+        {
+            left[q] += queries[q] * l;
+            right[q] += queries[q] * r;
+        }
+        queries += RF_TILE_QUERIES;
+        candidates += RF_TILE_CANDIDATES;
+    }
+#pragma GCC unroll 12
+    for (int q = 0; q < ROWS; ++q)
+    {
+        *(Vector *)(out + q * stride) = left[q];
+        *(Vector *)(out + q * stride + WIDTH) = right[q];
+    }
+}
+
+TARGET static void SET(tile_products)(const float *queries, const float *candidates, int numbers, const float *start,
+                                      float *out, ptrdiff_t stride)
+{
+    for (int c = 0; c < RF_TILE_CANDIDATES; c += 2 * WIDTH)
+        for (int q = 0; q < RF_TILE_QUERIES; q += ROWS)
+            SET(tile_piece)(queries + q, candidates + c, numbers, start + c, out + q * stride + c, stride);
+}
+
+TARGET static void SET(fold_group)(const float *bounds, float *minima)
+{
+    for (int lane = 0; lane < RF_GROUP_LANES; lane += WIDTH)
+    {
+        Vector least = *(const Vector *)(bounds + lane);
+        for (int i = RF_GROUP_LANES; i < RF_GROUP_CANDIDATES; i += RF_GROUP_LANES)
+            least = LEAST(least, *(const Vector *)(bounds + i + lane));
+        *(Vector *)(minima + lane) = least;
+    }
+}
+
+TARGET static void SET(find_least)(const float *minima, int count, RfLeast *least)
+{
+    Vector all = *(const Vector *)minima;
+    for (int i = WIDTH; i < count; i += WIDTH)
+        all = LEAST(all, *(const Vector *)(minima + i));
+    float value = all[0];
+    for (int i = 1; i < WIDTH; ++i)
+        value = rf_min(all[i], value);
+    Vector limit = value - (Vector){0};
+    *least = (RfLeast){value, 0};
+    for (int i = 0; i < count; i += WIDTH)
+    {
+        unsigned bits = BELOW(*(const Vector *)(minima + i), limit);
+        if (bits)
+        {
+            least->index = i + __builtin_ctz(bits);
+            return;
+        }
+    }
+}
+
+TARGET static int SET(list_below)(const float *bounds, const float *minima, int count, float limit, int *list)
+{
+    Vector limits = limit - (Vector){0};
+    int listed = 0;
+    for (int i = 0; i < count; i += WIDTH)
+        for (unsigned bits = BELOW(*(const Vector *)(minima + i), limits); bits; bits &= bits - 1)
+        {
+            int lane = i + __builtin_ctz(bits),
+                first = lane / RF_GROUP_LANES * RF_GROUP_CANDIDATES + lane % RF_GROUP_LANES;
+            for (int c = first; c < first + RF_GROUP_CANDIDATES; c += RF_GROUP_LANES)
+            {
+                list[listed] = c;
+                listed += bounds[c] <= limit;
+            }
+        }
+    return listed;
+}
+
+#undef SET
+#undef TARGET
+#undef WIDTH
+#undef Vector
+#undef ROWS
+#undef LEAST
+#undef BELOW
