@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints a table of the library as Markdown, as it stands in docs/:
 //
-//     options lagrangian|warp|flow|exemplar
+//     options lagrangian|warp|measure|quantities|flow|exemplar
 //
-// A method's options, or the built-in flows or exemplars. A test holds the docs to it (cmake/doc_tables.sh).
+// Options of a method or of the measures, the quantities these give, or the built-in flows or exemplars. A test holds
+// the docs to it (cmake/doc_tables.sh).
 #include <riffle/riffle.h>
 
 #include <stdio.h>
@@ -75,6 +76,23 @@ static int print_builtins(const char *kind)
     return found ? 0 : 1;
 }
 
+static const char *sense_name(RfMeasureSense sense)
+{
+    static const char *const names[] = {"", "low", "high", "1", "0"};
+    return names[sense];
+}
+
+static void print_quantities(void)
+{
+    int count = 0;
+    const RfMeasureQuantity *table = rf_measure_quantity_table(&count);
+    printf("| quantity | unit | good | floor | what it is |\n| --- | --- | --- | --- | --- |\n");
+    for (int i = 0; i < count; ++i)
+        printf("| `%s` | %s | %s | %s%s%s | %s |\n", table[i].name, table[i].unit, sense_name(table[i].sense),
+               table[i].floor ? "`" : "", table[i].floor ? table[i].floor : "", table[i].floor ? "`" : "",
+               table[i].sentence);
+}
+
 int main(int argc, char **argv)
 {
     const char *what = argc == 2 ? argv[1] : "";
@@ -84,11 +102,18 @@ int main(int argc, char **argv)
         table = rf_lagrangian_option_table(&count);
     else if (strcmp(what, "warp") == 0)
         table = rf_warp_option_table(&count);
+    else if (strcmp(what, "measure") == 0)
+        table = rf_measure_option_table(&count);
     else if (strcmp(what, "flow") == 0 || strcmp(what, "exemplar") == 0)
         return print_builtins(what);
+    else if (strcmp(what, "quantities") == 0)
+    {
+        print_quantities();
+        return 0;
+    }
     if (!table)
     {
-        fprintf(stderr, "usage: options lagrangian|warp|flow|exemplar\n");
+        fprintf(stderr, "usage: options lagrangian|warp|measure|quantities|flow|exemplar\n");
         return 2;
     }
     print_options(table, count);

@@ -434,6 +434,24 @@ static void every_double_of_a_frame_has_its_line_in_the_table(void **state)
     assert_true(!seen[offsetof(RfMeasureFrame, index) / sizeof(double)]);
 }
 
+static void the_option_table_has_the_defaults_and_every_option(void **state)
+{
+    (void)state;
+    int count;
+    const RfOption *table = rf_measure_option_table(&count);
+    RfMeasureOptions options = rf_measure_defaults();
+    for (int i = 0; i < count; ++i)
+    {
+        const uint8_t *field = (const uint8_t *)&options + table[i].offset;
+        double value = table[i].kind == RF_OPTION_UINT64 ? (double)*(const uint64_t *)(const void *)field
+                       : table[i].kind == RF_OPTION_BOOL ? *(const bool *)field
+                                                         : *(const int *)(const void *)field;
+        assert_true(value == table[i].default_value);
+        assert_true(table[i].minimum <= value && value <= table[i].maximum);
+    }
+    assert_int_equal(count, 12);
+}
+
 static RfMeasureStatistic statistic(const RfMeasure *measure, const char *name)
 {
     RfMeasureSummary summary;
@@ -693,6 +711,7 @@ int main(void)
         cmocka_unit_test(a_frame_of_nothing_but_holes_gives_no_other_number),
         cmocka_unit_test(a_source_diverges_by_its_strength_and_a_rotation_does_not),
         cmocka_unit_test(every_double_of_a_frame_has_its_line_in_the_table),
+        cmocka_unit_test(the_option_table_has_the_defaults_and_every_option),
         cmocka_unit_test(the_summary_has_means_ratios_of_means_and_the_worst_frame),
         cmocka_unit_test(maps_hold_what_the_numbers_are_made_of),
         cmocka_unit_test(results_are_the_same_bytes_for_any_number_of_threads),

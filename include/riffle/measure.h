@@ -61,11 +61,11 @@ typedef struct RfMeasureOptions
     /// Who estimates the motion. Default RF_MEASURE_INVERSE_SEARCH.
     RfMeasureEstimator estimator;
 
-    /// The flow error is computed at every so-manieth frame that has a predecessor, the first one included; 0 never.
+    /// The flow error is computed at every n-th frame that has a predecessor, the first one included; 0 never.
     /// Default 5. Three estimates each.
     int flow_every;
 
-    /// The patch distance is computed at every so-manieth frame, the first one included; 0 never. Default 10. The
+    /// The patch distance is computed at every n-th frame, the first one included; 0 never. Default 10. The
     /// costliest measure.
     int patch_every;
 
