@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // riffle measure FRAMES: one frame after the other is read, paired with the flow by its number and judged; then the
-// table and the reports.
+// table and the reports. A worker judges, so that after a signal a long frame need not be waited for.
 #include "errors.h"
 #include "flow_input.h"
 #include "image_input.h"
@@ -13,15 +13,20 @@
 #include "stop.h"
 #include "text.h"
 #include "verbs.h"
+#include "worker.h"
 
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum
 {
     /// Of the library's measures.
     MIN_SIDE = 16
 };
+
+// After a signal the frame on the way is waited for so long.
+static const double g_grace_seconds = 0.6, g_poll_seconds = 0.05;
 
 typedef struct Judging
 {
@@ -35,6 +40,10 @@ typedef struct Judging
     uint8_t *mask;
     RfMeasure *measure;
     Progress progress;
+    Worker worker;
+    /// Of the frame that the worker judges, and what computing it took.
+    int index;
+    double seconds;
     Report report;
 } Judging;
 
@@ -233,21 +242,28 @@ static int judge_frame(Judging *judging, int index, const RfImage *frame)
     double start = now_seconds();
     RfResult result =
         rf_measure_step(judging->measure, flowing ? &flow : NULL, judging->mask, &view, &report->values[index]);
-    double seconds = now_seconds() - start;
+    judging->seconds = now_seconds() - start;
     if (result == RF_OK && report->gallery.wanted)
         result = gallery_take(&report->gallery, judging->measure, &report->values[index], index, judging->plan.count,
                               number, frame);
-    if (result != RF_OK)
-        return fail_result(result, path);
-    progress_frame(&judging->progress, number, seconds, NULL, 0);
-    return CODE_DONE;
+    return result == RF_OK ? CODE_DONE : fail_result(result, path);
 }
 
-static int judge_next(Judging *judging, int index)
+static bool hear(void *user, const char *stage, double fraction)
 {
+    (void)user, (void)stage, (void)fraction;
+    return !stop_asked();
+}
+
+/// The worker's job.
+static int judge_next(void *context)
+{
+    static const RfProgress progress = {hear, NULL};
+    Judging *judging = context;
     RfImage *frame = NULL;
     bool alpha = false;
-    progress_stage(&judging->progress, "reading");
+    int index = judging->index;
+    rf_set_progress(&progress);
     int code = read_frame(judging, index, &frame, &alpha);
     RfImageView view = code ? (RfImageView){0} : rf_image_view(frame);
     if (!code && index == 0)
@@ -260,32 +276,45 @@ static int judge_next(Judging *judging, int index)
 
 // ---- the run -----------------------------------------------------------------------------------------------------
 
-static bool hear(void *user, const char *stage, double fraction)
+static void tell_stop(const Judging *judging)
 {
-    (void)fraction;
-    progress_stage(user, stage);
-    return !stop_asked();
+    warn(judging->settings, NULL, "stopped by signal %d with %d of %d frames judged; nothing is written", stop_asked(),
+         judging->report.count, judging->plan.count);
+}
+
+static int judge_one(Judging *judging, int index)
+{
+    int code = CODE_DONE;
+    judging->index = index;
+    worker_post(&judging->worker, judge_next, judging);
+    while (!worker_wait(&judging->worker, g_poll_seconds, &code))
+    {
+        progress_stage(&judging->progress, "judging");
+        if (stop_age() < g_grace_seconds)
+            continue;
+        // The worker still uses everything: the program leaves from here.
+        progress_clear(&judging->progress);
+        tell_stop(judging);
+        _exit(CODE_SIGNAL + stop_asked());
+    }
+    if (code)
+        return code;
+    ++judging->report.count;
+    progress_frame(&judging->progress, judging->report.numbers[index], judging->seconds, NULL, 0);
+    return CODE_DONE;
 }
 
 static int judge_all(Judging *judging)
 {
-    int count = judging->plan.count, code = CODE_DONE;
-    RfProgress progress = {hear, &judging->progress};
+    int count = judging->plan.count, code = worker_start(&judging->worker);
     progress_begin(&judging->progress, judging->settings, count, 0);
-    rf_set_progress(&progress);
-    stop_is_harmless(true);
     for (int i = 0; i < count && !code; ++i)
-    {
-        code = stop_asked() ? CODE_SIGNAL + stop_asked() : judge_next(judging, i);
-        judging->report.count += code ? 0 : 1;
-    }
-    stop_is_harmless(false);
-    rf_set_progress(NULL);
+        code = stop_asked() ? CODE_SIGNAL + stop_asked() : judge_one(judging, i);
+    worker_end(&judging->worker);
     if (code)
         progress_clear(&judging->progress);
     if (code >= CODE_SIGNAL)
-        warn(judging->settings, NULL, "stopped by signal %d with %d of %d frames judged; nothing is written",
-             stop_asked(), judging->report.count, count);
+        tell_stop(judging);
     return code;
 }
 
@@ -306,6 +335,23 @@ static int open_inputs(Judging *judging)
     if (!code && settings->flow)
         code = check_pairing(judging);
     return code;
+}
+
+static void tell_inputs(const Judging *judging)
+{
+    const Settings *settings = judging->settings;
+    const RfFlowInfo *info = &judging->flow.info;
+    const int *numbers = judging->plan.numbers;
+    tell(settings, "frames: %d, %d to %d; %s, %d threads", judging->plan.count, numbers[0],
+         numbers[judging->plan.count - 1], rf_simd_name(), rf_threads());
+    if (settings->flow)
+        tell(settings, "flow: %s, %d x %d cells, %s; %s; greatest speed %.3g cells a frame", info->format, info->width,
+             info->height, info->has_mask ? "with a mask" : "no mask", info->conventions, (double)info->max_speed);
+    if (settings->flow)
+        flow_input_warn_of_speed(&judging->flow, settings);
+    RfImageView exemplar = judging->exemplar ? rf_image_view(judging->exemplar) : (RfImageView){0};
+    if (judging->exemplar)
+        tell(settings, "exemplar: %d x %d pixels, %d channels", exemplar.width, exemplar.height, exemplar.channels);
 }
 
 static int make_report(Judging *judging)
@@ -356,6 +402,7 @@ int run_measure(Settings *settings)
     if (!code)
     {
         setup_end();
+        tell_inputs(judging);
         code = judge_all(judging);
     }
     if (!code)
