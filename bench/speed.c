@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How fast is a step? CSV on stdout: case,size,threads,stage,ms (median of n frames),n,copy floor ms,sampling floor ms.
 //
-//   bench_speed [frames=60]
+//   bench_speed [frames=60] [case=N]      N from 1: that case alone
 //
 // The floors are measured in the same run, after every fifth frame: copying a frame, and one bilinear RGBA sample a
 // drawn sample, no weights, no edges. The machine may be shared, so compare figures of one run only.
@@ -158,7 +158,10 @@ static double run(const RfExemplar *exemplar, const Case *test, int threads, int
 
 int main(int argc, char **argv)
 {
-    int frames = argc > 1 ? atoi(argv[1] + (strncmp(argv[1], "frames=", 7) == 0 ? 7 : 0)) : 60;
+    int frames = 60, only = 0;
+    for (int i = 1; i < argc; ++i)
+        if (sscanf(argv[i], "frames=%d", &frames) != 1 && sscanf(argv[i], "case=%d", &only) != 1)
+            return fprintf(stderr, "bench_speed: %s: must be frames=N or case=N\n", argv[i]), 2;
     frames = frames < 1 ? 1 : frames > MAX_FRAMES ? MAX_FRAMES : frames;
     RfImage *image;
     require(rf_image_read("builtin:bubbles?size=256", &image));
@@ -174,8 +177,10 @@ int main(int argc, char **argv)
                           {"defaults at 12 px a frame", scene_two_vortices, options},
                           {"histogram blend at 3 px a frame", slow_vortices, histogram},
                           {"paper at 3 px a frame", slow_vortices, paper}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i)
+    for (int i = 0; i < (int)(sizeof cases / sizeof cases[0]); ++i)
     {
+        if (only != 0 && only != i + 1)
+            continue;
         double one = run(exemplar, &cases[i], 1, frames), two = run(exemplar, &cases[i], 2, frames);
         printf("# %s: 2 threads are %.2f times as fast as 1\n", cases[i].name, one / two);
     }

@@ -238,7 +238,8 @@ static void print_flow(const char *path, const RfFlowInfo *info)
     printf(", %s\n  speed: greatest %.4g, mean %.4g cells a frame\n", info->has_mask ? "with a mask" : "no mask",
            (double)info->max_speed, (double)info->mean_speed);
     if (info->filled_vectors > 0)
-        printf("  %d invalid vectors, filled from their neighbours\n", info->filled_vectors);
+        printf("  %d invalid vector%s, filled from %s neighbours\n", info->filled_vectors,
+               info->filled_vectors == 1 ? "" : "s", info->filled_vectors == 1 ? "its" : "their");
     if (info->conventions[0])
         printf("  %s\n", info->conventions);
 }

@@ -158,9 +158,9 @@ void progress_done(Progress *progress)
         fprintf(stderr, ",\"threads\":%d}\n", rf_threads());
     }
     else if (progress->kind != PROGRESS_NONE)
-        fprintf(stderr, "%d frame%s in %.1f s: %.1f ms a frame to compute, the first %.1f ms; %.0f MiB, %d threads\n",
+        fprintf(stderr, "%d frame%s in %.1f s: %.1f ms a frame to compute, the first %.1f ms; %.0f MiB, %d thread%s\n",
                 progress->made, progress->made == 1 ? "" : "s", now_seconds() - progress->started, 1e3 * mean,
-                1e3 * progress->first_seconds, peak_mib(), rf_threads());
+                1e3 * progress->first_seconds, peak_mib(), rf_threads(), rf_threads() == 1 ? "" : "s");
 }
 
 void progress_nothing_left(const Settings *settings, int total)

@@ -182,14 +182,14 @@ static void tell_texture(const Texture *texture, const FramePlan *plan)
     tell(settings, "exemplar: %d x %d pixels, %d channels, %s", rf_exemplar_width(exemplar),
          rf_exemplar_height(exemplar), rf_exemplar_channels(exemplar),
          rf_exemplar_tiles(exemplar) ? "tiles" : "does not tile");
-    tell(settings, "method: %s, frames %d to %d, %d x %d pixels, %s, %d threads", texture->method->name,
+    tell(settings, "method: %s, frames %d to %d, %d x %d pixels, %s, %d thread%s", texture->method->name,
          plan_number(plan, 0), plan_number(plan, plan->count - 1), texture->width, texture->height, rf_simd_name(),
-         rf_threads());
+         rf_threads(), rf_threads() == 1 ? "" : "s");
     flow_input_warn_of_size(&texture->flow, settings, texture->width, texture->height);
     flow_input_warn_of_speed(&texture->flow, settings);
     if (info->filled_vectors > 0)
-        warn(settings, settings->words[0], "%d invalid vectors were filled from their neighbours",
-             info->filled_vectors);
+        warn(settings, settings->words[0], "%d invalid vector%s filled from %s neighbours", info->filled_vectors,
+             info->filled_vectors == 1 ? " was" : "s were", info->filled_vectors == 1 ? "its" : "their");
 }
 
 static int stream_texture(Texture *texture, const InputFiles *inputs)

@@ -252,8 +252,10 @@ static void quiet_says_nothing_and_plain_says_how_it_went(void **state)
     result = run_in(&folder, TEST_TEXTURE "null: --frames 1-2");
     assert_non_null(strstr(result.err, "2 frames in "));
     command_free(&result);
-    result = run_in(&folder, TEST_TEXTURE "null: --frames 1-2 -v");
+    result = run_in(&folder, TEST_TEXTURE "null: --frames 1-2 -v --threads 1");
     assert_non_null(strstr(result.err, "advect"));
+    assert_non_null(strstr(result.err, ", 1 thread\nframe 1 "));
+    assert_non_null(strstr(result.err, " MiB, 1 thread\n"));
     command_free(&result);
     test_folder_remove(&folder);
 }

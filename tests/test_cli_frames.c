@@ -102,6 +102,36 @@ static void every_sth_frame_is_the_same_as_in_the_full_run(void **state)
     test_folder_remove(&folder);
 }
 
+/// b.%04d.exr against n.%04d.npy, which has the frame's floats as they are: says which of them is wrong.
+static void assert_exr_holds_the_frame(const TestFolder *folder, int frame)
+{
+    enum
+    {
+        NPY_HEADER = 128
+    };
+    char exr[32], npy[32];
+    snprintf(exr, sizeof exr, "b.%04d.exr", frame);
+    snprintf(npy, sizeof npy, "n.%04d.npy", frame);
+    size_t size = 0;
+    unsigned char *data = test_file_read(test_folder_file(folder, npy), &size);
+    RfImage *image = NULL;
+    if (rf_image_read(test_folder_file(folder, exr), &image) != RF_OK)
+        fail_msg("%s: %s %s", exr, rf_last_error()->place, rf_last_error()->message);
+    RfImageView view = rf_image_view(image);
+    size_t count = (size_t)view.width * (size_t)view.height * (size_t)view.channels;
+    assert_int_equal(size, NPY_HEADER + count * sizeof(float));
+    for (size_t k = 0; k < count; ++k)
+    {
+        float there, wanted;
+        memcpy(&there, data + NPY_HEADER + k * sizeof there, sizeof there);
+        wanted = there <= 0.04045f ? there / 12.92f : powf((there + 0.055f) / 1.055f, 2.4f);
+        if (!(fabsf(view.pixels[k] - wanted) <= 1e-6f))
+            fail_msg("%s: sample %zu is %g, the frame has %g", exr, k, (double)view.pixels[k], (double)there);
+    }
+    rf_image_destroy(image);
+    free(data);
+}
+
 static void one_run_feeds_all_its_outputs(void **state)
 {
     (void)state;
@@ -111,8 +141,10 @@ static void one_run_feeds_all_its_outputs(void **state)
         skip();
     }
     TestFolder folder = test_folder_make();
-    expect(&folder, TEST_TEXTURE "a.%04d.png -o b.%04d.exr -o c.mp4 -o null: --frames 1-3", 0);
-    assert_int_equal(test_folder_count(&folder), 3 + 3 + 1);
+    expect(&folder, TEST_TEXTURE "a.%04d.png -o b.%04d.exr -o n.%04d.npy -o c.mp4 -o null: --frames 1-3", 0);
+    assert_int_equal(test_folder_count(&folder), 3 + 3 + 3 + 1);
+    for (int i = 1; i <= 3; ++i)
+        assert_exr_holds_the_frame(&folder, i);
     expect(&folder, "convert b.%04d.exr d.%04d.npy -o e.%04d.png", 0);
     // Eight bits, linear light in EXR, eight bits again.
     RfImage *a = NULL, *b = NULL;

@@ -86,6 +86,9 @@ static void unknown_vectors_of_middlebury_become_mask(void **state)
     assert_int_equal(view.mask[0], 1);
     assert_int_equal(view.mask[1], 0);
     assert_velocity(&view, 1, 0, 0, 0);
+    // Land is in neither.
+    assert_true(fabsf(rf_flow_info(flow).max_speed - hypotf(1, 2)) < 1e-6f);
+    assert_true(fabsf(rf_flow_info(flow).mean_speed - hypotf(1, 2)) < 1e-6f);
     rf_flow_close(flow);
 }
 

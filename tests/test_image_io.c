@@ -391,6 +391,27 @@ static void jpeg_is_read_in_grey_and_colour_baseline_and_progressive(void **stat
     }
 }
 
+static void what_is_too_large_for_a_half_becomes_the_largest_half(void **state)
+{
+    (void)state;
+    static const float numbers[] = {65504, 65519, 65520, 70000, 1e30f, -65505, -1e30f, 1};
+    static const float halves[] = {65504, 65504, 65504, 65504, 65504, -65504, -65504, 1};
+    const char *path = test_folder_file(&g_folder, "large.exr");
+    RfImage *image = make_image(8, 1, 1, RF_SAMPLE_HALF, RF_ENCODING_LINEAR), *back;
+    memcpy(rf_image_view(image).pixels, numbers, sizeof numbers);
+    assert_int_equal(rf_image_write(path, image), RF_OK);
+    assert_int_equal(rf_image_read(path, &back), RF_OK);
+    assert_memory_equal(rf_image_view(back).pixels, halves, sizeof halves);
+    rf_image_destroy(back);
+    // Floats hold them.
+    rf_image_set_origin(image, RF_SAMPLE_FLOAT, RF_ENCODING_LINEAR);
+    assert_int_equal(rf_image_write(path, image), RF_OK);
+    assert_int_equal(rf_image_read(path, &back), RF_OK);
+    assert_memory_equal(rf_image_view(back).pixels, numbers, sizeof numbers);
+    rf_image_destroy(back);
+    rf_image_destroy(image);
+}
+
 static void exr_is_read_in_every_compression_as_scanlines_and_tiles_with_a_window_anywhere(void **state)
 {
     (void)state;
@@ -540,6 +561,7 @@ int main(void)
         cmocka_unit_test(every_png_colour_type_and_depth_is_read_interlaced_or_not),
         cmocka_unit_test(png_palettes_and_transparent_colours_are_expanded),
         cmocka_unit_test(jpeg_is_read_in_grey_and_colour_baseline_and_progressive),
+        cmocka_unit_test(what_is_too_large_for_a_half_becomes_the_largest_half),
         cmocka_unit_test(exr_is_read_in_every_compression_as_scanlines_and_tiles_with_a_window_anywhere),
         cmocka_unit_test(real_exemplars_are_read),
         cmocka_unit_test(a_builtin_exemplar_is_an_image),

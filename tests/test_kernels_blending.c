@@ -46,7 +46,7 @@ static RfTexture make_texture(bool tiles)
 static RfDrawJob make_job(const RfTexture *texture, float sharpness)
 {
     return (RfDrawJob){
-        .texture = texture, .sharpness = sharpness, .spacing = 1, .width = RF_TILE_COLUMNS, .height = RF_TILE_ROWS};
+        .texture = texture, .sharpness = sharpness, .area = {{0, 0}, 1, 1, RF_TILE_COLUMNS, RF_TILE_ROWS}};
 }
 
 // Vertices move by up to `bend` cells.
@@ -143,10 +143,10 @@ static void draw_slowly(const RfDrawJob *job, const RfDrawGrid *g, int level)
     for (int p = 0; p < PIXELS; ++p)
     {
         int i = p % RF_TILE_COLUMNS, j = p / RF_TILE_COLUMNS;
-        double x = (double)job->origin.x + (i + 0.5) * (double)job->spacing,
-               y = (double)job->origin.y + (j + 0.5) * (double)job->spacing, value[3];
+        double x = (double)job->area.origin.x + (i + 0.5) * (double)job->area.spacing,
+               y = (double)job->area.origin.y + (j + 0.5) * (double)job->area.spacing, value[3];
         double kernel = 1 - hypot(x - (double)g->centre.x, y - (double)g->centre.y) / (double)g->radius;
-        if (i >= job->width || j >= job->height || kernel <= 0 || !find_point(g, x, y, value))
+        if (i >= job->area.width || j >= job->area.height || kernel <= 0 || !find_point(g, x, y, value))
             continue;
         double w = pow(kernel, (double)job->sharpness) * value[2] * (double)g->fade;
         g_slow.weight[p] += w;
@@ -181,11 +181,11 @@ static void check_drawing(float bend, float sharpness, bool tiles, float spacing
     RfTileSums sums;
     RfTexture texture = make_texture(tiles);
     RfDrawJob job = make_job(&texture, sharpness);
-    job.spacing = spacing;
+    job.area.spacing = job.area.row_spacing = spacing;
     job.level_bias = bias;
-    job.origin = (RfVec2){-3, 10};
-    job.width = RF_TILE_COLUMNS - 5;
-    job.height = RF_TILE_ROWS - 9;
+    job.area.origin = (RfVec2){-3, 10};
+    job.area.width = RF_TILE_COLUMNS - 5;
+    job.area.height = RF_TILE_ROWS - 9;
     assert_int_equal(rf_tile_create(QUADS, RF_TILE_ROWS, &arena, &sums), RF_OK);
     memset(&g_slow, 0, sizeof g_slow);
     // One in the middle, one across two borders of the tile, one in a corner, one out of sight.
@@ -231,6 +231,52 @@ static void triangles_that_share_edges_leave_no_hole_and_draw_no_pixel_twice(voi
     check_drawing(0.2f, 2, false, 1, 0, 5e-4);
 }
 
+static void grids_of_large_cells_are_drawn_so_from_every_fourth_row(void **state)
+{
+    (void)state;
+    static RfRasterPlanes planes;
+    static RfTileLayer layers[PIXELS];
+    static TestGrid g;
+    RfTexture texture = make_texture(true);
+    RfDrawJob job = make_job(&texture, 1);
+    // How much each corner moves by, and what that may do to coordinates, in exemplar pixels: rows of an undeformed
+    // grid lie exactly between others.
+    static const struct
+    {
+        float bend;
+        double greatest, mean;
+    } cases[] = {{0, 1e-3, 1e-4}, {0.1f, 0.6, 0.06}};
+    for (int c = 0; c < 2; ++c)
+    {
+        make_grid(&g, (RfVec2){61.3f, 30.7f}, 40, cases[c].bend, 11);
+        memset(&g_slow, 0, sizeof g_slow);
+        memset(layers, 0, sizeof layers);
+        draw_slowly(&job, &g.draw, 0);
+        rf_tile_layers(&job, &g.draw, &planes, layers);
+        double greatest = 0, sum = 0, weights = 0, greatest_weight = 0;
+        int count = 0;
+        for (int p = 0; p < PIXELS; ++p)
+        {
+            double weight = fabs((double)layers[p].total - g_slow.weight[p]);
+            greatest_weight = weight > greatest_weight ? weight : greatest_weight;
+            weights += weight;
+            if (!(g_slow.weight[p] > 0.02))
+                continue;
+            double error = hypot((double)layers[p].u[0] - g_slow.u[p], (double)layers[p].v[0] - g_slow.v[p]);
+            greatest = error > greatest ? error : greatest;
+            sum += error;
+            ++count;
+        }
+        print_message(
+            "corners moved by %.1f cells: coordinates off by at most %.4f px, %.4f in the mean; weights by at "
+            "most %.4f, %.5f\n",
+            (double)cases[c].bend, greatest, sum / count, greatest_weight, weights / PIXELS);
+        assert_true(count > 3000 && greatest < cases[c].greatest && sum / count < cases[c].mean);
+        assert_true(greatest_weight < 0.05 && weights / PIXELS < 2e-3);
+    }
+    rf_texture_free(&texture);
+}
+
 static void vertices_on_pixel_centres_leave_no_hole(void **state)
 {
     (void)state;
@@ -270,7 +316,7 @@ static void layers_are_the_strongest_grids_with_their_coordinates(void **state)
     (void)state;
     RfTexture texture = make_texture(true);
     RfDrawJob job = make_job(&texture, 2);
-    static RfTilePlanes planes;
+    static RfRasterPlanes planes;
     static RfTileLayer layers[PIXELS];
     static SlowSums single[6];
     static TestGrid grids[6];
@@ -615,6 +661,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(undeformed_grids_are_drawn_as_the_slow_form_draws_them),
         cmocka_unit_test(any_sharpness_is_within_a_thousandth),
         cmocka_unit_test(triangles_that_share_edges_leave_no_hole_and_draw_no_pixel_twice),
+        cmocka_unit_test(grids_of_large_cells_are_drawn_so_from_every_fourth_row),
         cmocka_unit_test(vertices_on_pixel_centres_leave_no_hole),
         cmocka_unit_test(a_coarser_spacing_draws_the_coarser_level),
         cmocka_unit_test(layers_are_the_strongest_grids_with_their_coordinates),

@@ -328,6 +328,35 @@ static void half_pixel_shifts_and_turns_are_found_when_they_are_asked_for(void *
     assert_true(with.patch.share > 0.9);
 }
 
+static void an_exemplar_is_found_wherever_it_lies_in_a_large_frame(void **state)
+{
+    (void)state;
+    enum
+    {
+        WIDTH = 2048,
+        HEIGHT = 600,
+        SIDE = 16
+    };
+    float *pixels = malloc((size_t)WIDTH * HEIGHT * sizeof *pixels);
+    assert_non_null(pixels);
+    RfImageView exemplar = {g_texture, SIDE, SIDE, 1, N}, frame = {pixels, WIDTH, HEIGHT, 1, WIDTH};
+    RfMeasureOptions options = rf_measure_defaults();
+    options.patch_size = 5;
+    for (int place = 500; place <= HEIGHT - SIDE; place += (HEIGHT - SIDE - 500) / 4)
+    {
+        for (int k = 0; k < WIDTH * HEIGHT; ++k)
+            pixels[k] = rf_random_float(3, 0, (uint64_t)k, 0);
+        for (int y = 0; y < SIDE; ++y)
+            memcpy(pixels + (place + y) * WIDTH + 1900, g_texture + y * N, SIDE * sizeof *pixels);
+        RfMeasure *measure = make(&exemplar, options);
+        RfMeasureFrame m;
+        assert_int_equal(rf_measure_step(measure, NULL, NULL, &frame, &m), RF_OK);
+        assert_true(m.patch.missing < 1e-3 && m.patch.residual > 10);
+        rf_measure_destroy(measure);
+    }
+    free(pixels);
+}
+
 // ---- holes -------------------------------------------------------------------------------------------------------
 
 static void holes_are_counted_to_the_pixel_however_they_are_marked(void **state)
@@ -706,6 +735,7 @@ int main(void)
         cmocka_unit_test(another_sample_of_the_texture_is_as_good_as_the_floors_and_white_noise_is_not),
         cmocka_unit_test(shuffled_tiles_use_all_of_the_exemplar_and_one_repeated_tile_does_not),
         cmocka_unit_test(half_pixel_shifts_and_turns_are_found_when_they_are_asked_for),
+        cmocka_unit_test(an_exemplar_is_found_wherever_it_lies_in_a_large_frame),
         cmocka_unit_test(holes_are_counted_to_the_pixel_however_they_are_marked),
         cmocka_unit_test(black_is_no_hole_where_the_exemplar_has_black),
         cmocka_unit_test(a_frame_of_nothing_but_holes_gives_no_other_number),

@@ -384,6 +384,23 @@ static void any_number_of_threads_gives_the_same_bytes(void **state)
     assert_memory_equal(first, again, sizeof first);
 }
 
+static void streaks_do_not_break_where_tiles_meet(void **state)
+{
+    (void)state;
+    RfFlowView view = view_of_velocity();
+    scene_uniform(W, H, (RfVec2){2, 0.3f}, g_velocity);
+    picture(RF_FLOW_LIC, 0, &view, g_frame);
+    // The first tile ends between columns 95 and 96.
+    double across = 0, inside = 0;
+    for (int y = 0; y < H; ++y)
+        for (int x = 1; x < W; ++x)
+        {
+            const float *p = g_frame + 3 * (y * W + x);
+            *(x == 96 ? &across : &inside) += fabs((double)(grey(p) - grey(p - 3))) / (x == 96 ? 1 : W - 2);
+        }
+    assert_true(across < 1.5 * inside);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -403,6 +420,7 @@ int main(void)
         cmocka_unit_test(a_hill_is_lit_from_the_left_and_casts_its_shadow_to_the_right),
         cmocka_unit_test(a_field_of_one_texel_and_heights_that_are_no_numbers_can_be_drawn),
         cmocka_unit_test(any_number_of_threads_gives_the_same_bytes),
+        cmocka_unit_test(streaks_do_not_break_where_tiles_meet),
     };
     return cmocka_run_group_tests_name("render", tests, NULL, NULL);
 }

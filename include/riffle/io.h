@@ -16,8 +16,9 @@
 RF_API RF_MUST_USE RfResult rf_image_read(const char *path, RfImage **out);
 
 /// Writes PNG, EXR or NPY by the extension. PNG: 8 bit for RF_SAMPLE_U8, else 16; 1 to 4 channels, values clamped to
-/// 0..1 and taken as they are. EXR: half for RF_SAMPLE_HALF, else float; sRGB-encoded colour is made linear. NPY:
-/// float32 [H, W, C] as they are. Replaces `path` whether it exists or not; asking first is the caller's affair.
+/// 0..1 and taken as they are. EXR: half for RF_SAMPLE_HALF (limited to 65504), else float; sRGB-encoded colour is made
+/// linear. NPY: float32 [H, W, C] as they are. Replaces `path` whether it exists or not; asking first is the caller's
+/// affair.
 RF_API RF_MUST_USE RfResult rf_image_write(const char *path, const RfImage *image);
 
 /// The bytes of a PNG, as rf_image_write would put them into a file but smaller and slower; freed with rf_free.
@@ -75,7 +76,7 @@ typedef struct RfFlowInfo
     bool has_mask;
     /// Vectors marked invalid in the first moment and filled from their neighbours.
     int filled_vectors;
-    /// Greatest and mean speed of the first moment, in cells a frame after all scaling.
+    /// Greatest and mean speed of the first moment's fluid, in cells a frame after all scaling; land does not count.
     float max_speed, mean_speed;
     /// "flo", "npy", "nc", "builtin", ...
     char format[16];

@@ -35,7 +35,7 @@ typedef struct RfLagrangianOptions
     /// Vertices along a side of a grid, 4 to 32. Default 8. More follow fine motion; cost grows as its square.
     int grid_vertices;
 
-    /// Largest stretch or squash of a triangle before its weight is 0 (delta_max), 1.05 to 100. Default 2.05. Smaller
+    /// Largest stretch or squash of a triangle before its weight is 0 (delta_max), 1.05 to 100. Default 1.95. Smaller
     /// keeps the spectrum, larger follows longer.
     float max_distortion;
 

@@ -278,13 +278,17 @@ static void measure_speed(const RfFlowField *field, RfFlowInfo *info)
 {
     size_t cells = (size_t)field->width * (size_t)field->height;
     double sum = 0;
+    size_t fluid = 0;
     for (size_t k = 0; k < cells; ++k)
     {
+        if (field->mask && !field->mask[k])
+            continue;
         float speed = hypotf(field->velocity[2 * k], field->velocity[2 * k + 1]);
         info->max_speed = fmaxf(info->max_speed, speed);
         sum += (double)speed;
+        ++fluid;
     }
-    info->mean_speed = (float)(sum / (double)cells);
+    info->mean_speed = fluid ? (float)(sum / (double)fluid) : 0;
 }
 
 static int number_step(const RfSequence *sequence)

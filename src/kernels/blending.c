@@ -2,23 +2,20 @@
 // Yu, Neyret, Bruneton, Holzschuch. Spectrum-preserving texture advection for animated fluids. INRIA RR-6810, 2009,
 // section 3.3.
 //
-// A grid is 2 (n - 1)^2 triangles; over a triangle the exemplar coordinates and the vertex weights are linear. A grid
-// is drawn into a tile in three passes, each as wide as it can be:
+// A grid is drawn into a tile in three passes, each as wide as it can be:
 //
-//   1. Rasterise. Triangle by triangle and row by row, u, v and K_g K_d are written into three planes of the tile. Rows
-//   are short (a dozen pixels),
-//      so nothing else is done here.
-//   2. Weigh. Whole rows of the tile: w = K_p K_g K_d F, texel index and fractions.
+//   1. Rasterise and weigh, on a lattice of every fourth pixel: exemplar coordinates u, v and w = K_p K_g K_d F. All
+//      three are smooth over tens of pixels, so between the points they are interpolated; that bends the straight
+//      edges between triangles by a fraction of a pixel, far less than what triangles make of the flow. Grids with
+//      cells under COARSE_CELL pixels are rasterised at every pixel. Points of the lattice that the grid does not
+//      reach have w = 0 and the coordinates of the grid's mean deformation.
+//   2. Find texels. Whole rows of the tile: texel index and fractions.
 //   3. Sample. One pixel at a time, but four channels of two neighbouring texels at once: with a = the pair in the
-//   upper row, b = in the lower one,
+//      upper row, b = in the lower one,
 //
 //          r = a + fy (b - a),      sum += (w (1 - fx), w fx) * r      (the halves are added up),
 //
 //      which is two loads and three operations a sample, with no gathers and no unpacking.
-//
-// Edges: rows and pixels are half-open intervals of pixel centres and an edge's crossing is computed from its ends in
-// one order, so two triangles that share an edge leave no gap between them. Where a grid folds over itself the later
-// triangle shows; its quality is 0 there.
 //
 // Minification: the mean deformation of the grid chooses the texture level (by area) and, along its compressed axis, up
 // to four taps, whose variance is that of a box as wide as the footprint, less what a sample already averages. One
@@ -29,7 +26,6 @@
 #include "core/maths.h"
 #include "core/result.h"
 #include "core/simd.h"
-#include "kernels/extrapolation.h"
 
 #include <string.h>
 
@@ -42,12 +38,13 @@ typedef float Vec8 __attribute__((vector_size(32), aligned(4), may_alias));
 // A row's ends are not drawn where others outweigh the grid by this: half a grey level at the most.
 #define NEGLIGIBLE (1.0f / 256)
 
-// Tile pixels.
-#define FARTHEST 1e6f
+// Cells of a grid, in pixels, from which on every fourth pixel is enough: three points a cell.
+#define COARSE_CELL 10.0f
 
 enum
 {
     MAX_TAPS = 4,
+    COARSE_STEP = 4,
     WIDE = 16,
     TILE_PIXELS = RF_TILE_ROWS * RF_TILE_COLUMNS
 };
@@ -55,9 +52,9 @@ enum
 RfResult rf_tile_create(int quads, int rows, RfArena *arena, RfTileSums *out)
 {
     out->colour = rf_arena_push(arena, (size_t)quads * TILE_PIXELS * 4, sizeof(float));
-    out->weight = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
-    out->weight2 = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
-    out->level = rf_arena_push(arena, TILE_PIXELS, sizeof(float));
+    out->weight = rf_arena_push(arena, TILE_PIXELS + WIDE, sizeof(float));
+    out->weight2 = rf_arena_push(arena, TILE_PIXELS + WIDE, sizeof(float));
+    out->level = rf_arena_push(arena, TILE_PIXELS + WIDE, sizeof(float));
     out->planes = rf_arena_push(arena, 1, sizeof *out->planes);
     if (!out->colour || !out->weight || !out->weight2 || !out->level || !out->planes)
         return RF_OUT_OF_MEMORY;
@@ -76,214 +73,30 @@ void rf_tile_clear(RfTileSums *sums, int quads, int rows)
     memset(sums->level, 0, pixels * sizeof(float));
 }
 
-// Columns of each row that a grid has written to.
-typedef struct Extent
-{
-    // Padded, so that whole vectors of rows can be updated.
-    int first[RF_TILE_ROWS + WIDE], end[RF_TILE_ROWS + WIDE];
-} Extent;
-
 typedef struct Filter
 {
     int level, taps;
     // From tap to tap, in exemplar pixels.
     RfVec2 step;
+    // From a pixel's exemplar coordinates to those of the pixel below, on average.
+    RfVec2 below;
 } Filter;
 
 // A tile's pixels of one row, ready to be sampled.
 typedef struct Row
 {
+    // Outside them the weights of a whole vector are 0.
     int first, end;
-    float weight[RF_TILE_PITCH];
+    float u[RF_TILE_PITCH], v[RF_TILE_PITCH], weight[RF_TILE_PITCH];
     // One tap: shares of the left and right texel pair in the weight, fraction from the upper to the lower pair.
     float left[RF_TILE_PITCH], right[RF_TILE_PITCH], fy[RF_TILE_PITCH];
     int index[RF_TILE_PITCH];
 } Row;
 
-// The part of the tile that the kernel's circle can reach, in tile pixels.
-typedef struct Region
+// Loops run over whole vectors: to here, where they would run to `end`.
+RF_WIDE_BODY int whole_vectors(int end)
 {
-    float x0, y0, x1, y1;
-    // The circle itself.
-    float cx, cy, radius;
-} Region;
-
-RF_WIDE_BODY Region region_of(const RfDrawJob *job, const RfDrawGrid *grid)
-{
-    float inverse = 1 / job->spacing, radius = grid->radius * inverse;
-    float cx = (grid->centre.x - job->origin.x) * inverse, cy = (grid->centre.y - job->origin.y) * inverse;
-    return (Region){rf_max(cx - radius, 0),
-                    rf_max(cy - radius, 0),
-                    rf_min(cx + radius, (float)job->width),
-                    rf_min(cy + radius, (float)job->height),
-                    cx,
-                    cy,
-                    radius};
-}
-
-// ---- rasterising
-
-typedef struct Corner
-{
-    float x, y;
-    Vec4 value; // u, v, K_g K_d, nothing
-} Corner;
-
-// A grid's vertices in tile pixels, and on which sides of the region they lie.
-typedef struct Vertices
-{
-    float x[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES], y[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES];
-    uint8_t outside[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES];
-} Vertices;
-
-RF_WIDE_BODY void place_vertices(const RfDrawJob *job, const RfDrawGrid *grid, const Region *region, Vertices *vertices)
-{
-    float inverse = 1 / job->spacing;
-    int count = grid->n * grid->n;
-#pragma omp simd
-    for (int k = 0; k < count; ++k)
-    {
-        // NaN and the absurdly far come to rest where integers still hold them.
-        float x = rf_clamp((grid->x[k] - job->origin.x) * inverse, -FARTHEST, FARTHEST);
-        float y = rf_clamp((grid->y[k] - job->origin.y) * inverse, -FARTHEST, FARTHEST);
-        vertices->x[k] = x;
-        vertices->y[k] = y;
-        vertices->outside[k] = (uint8_t)((x < region->x0 ? 1 : 0) | (x > region->x1 ? 2 : 0) |
-                                         (y < region->y0 ? 4 : 0) | (y > region->y1 ? 8 : 0));
-    }
-}
-
-RF_WIDE_BODY Corner corner_of(const RfDrawGrid *grid, const Vertices *vertices, int i, int j)
-{
-    int k = j * grid->n + i;
-    bool border = i == 0 || j == 0 || i == grid->n - 1 || j == grid->n - 1;
-    return (Corner){
-        vertices->x[k],
-        vertices->y[k],
-        {grid->u0 + (float)i * grid->cell, grid->v0 + (float)j * grid->cell, border ? 0.0f : grid->quality[k], 0}};
-}
-
-RF_WIDE_BODY bool is_above(const Corner *p, const Corner *q)
-{
-    return p->y < q->y || (p->y == q->y && p->x < q->x);
-}
-
-// Writes `count` pixels; u0, v0, w0 are the values at the first and dx their slopes along x.
-RF_WIDE_BODY void write_pixels(RfTilePlanes *planes, int place, int count, float u0, float v0, float w0, Vec4 dx)
-{
-    float *restrict u = planes->u + place, *restrict v = planes->v + place, *restrict weight = planes->weight + place;
-    float du = dx[0], dv = dx[1], dw = dx[2];
-    for (int block = 0; block < count; block += WIDE)
-#pragma omp simd
-        for (int k = block; k < block + WIDE; ++k)
-        {
-            float along = (float)k;
-            if (k < count)
-            {
-                u[k] = u0 + along * du;
-                v[k] = v0 + along * dv;
-                weight[k] = rf_max(w0 + along * dw, 0);
-            }
-        }
-}
-
-RF_WIDE_BODY float slope_of(const Corner *p, const Corner *q)
-{
-    return q->y > p->y ? (q->x - p->x) / (q->y - p->y) : 0;
-}
-
-// Pixels of a triangle's rows: [first, end), end <= first where there are none; and the values there.
-typedef struct TriangleRows
-{
-    int first[RF_TILE_ROWS + WIDE], end[RF_TILE_ROWS + WIDE];
-    // At the first pixel.
-    float u[RF_TILE_ROWS + WIDE], v[RF_TILE_ROWS + WIDE], weight[RF_TILE_ROWS + WIDE];
-} TriangleRows;
-
-// All rows of the triangle a, b, c (from top to bottom) at once.
-RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner *b, const Corner *c, Vec4 start,
-                            Vec4 dx, Vec4 dy, int first_row, int end_row, Extent *extent, TriangleRows *rows)
-{
-    float slope_ac = slope_of(a, c), slope_ab = slope_of(a, b), slope_bc = slope_of(b, c);
-    float ax = a->x, ay = a->y, bx = b->x, by = b->y, x0 = region->x0, x1 = region->x1;
-    float cx = region->cx, cy = region->cy, radius2 = region->radius * region->radius;
-    float su = start[0], sv = start[1], sw = start[2], dxu = dx[0], dxv = dx[1], dxw = dx[2], dyu = dy[0], dyv = dy[1],
-          dyw = dy[2];
-    int count = end_row - first_row;
-    int *restrict least = extent->first + first_row, *restrict most = extent->end + first_row;
-    for (int block = 0; block < count; block += WIDE)
-#pragma omp simd
-        for (int k = block; k < block + WIDE; ++k)
-        {
-            float y = (float)(first_row + k) + 0.5f, along = ax + (y - ay) * slope_ac;
-            float upper = ax + (y - ay) * slope_ab, lower = bx + (y - by) * slope_bc, other = y < by ? upper : lower;
-            float chord = sqrtf(rf_max(radius2 - (y - cy) * (y - cy), 0));
-            float left = rf_max(rf_min(along, other), rf_max(x0, cx - chord));
-            float right = rf_min(rf_max(along, other), rf_min(x1, cx + chord));
-            int first = (int)ceilf(left - 0.5f), end = (int)ceilf(right - 0.5f);
-            bool some = k < count && end > first;
-            rows->first[k] = first;
-            rows->end[k] = end;
-            rows->u[k] = su + (float)first * dxu + (y - 0.5f) * dyu;
-            rows->v[k] = sv + (float)first * dxv + (y - 0.5f) * dyv;
-            rows->weight[k] = sw + (float)first * dxw + (y - 0.5f) * dyw;
-            least[k] = some && first < least[k] ? first : least[k];
-            most[k] = some && end > most[k] ? end : most[k];
-        }
-}
-
-RF_WIDE_BODY void rasterise_triangle(const Region *region, const Corner *p, const Corner *q, const Corner *r,
-                                     RfTilePlanes *planes, Extent *extent)
-{
-    // a, b, c from top to bottom.
-    const Corner *a = p, *b = q, *c = r, *swap;
-    if (is_above(b, a))
-        swap = a, a = b, b = swap;
-    if (is_above(c, b))
-        swap = b, b = c, c = swap;
-    if (is_above(b, a))
-        swap = a, a = b, b = swap;
-    float abx = b->x - a->x, aby = b->y - a->y, acx = c->x - a->x, acy = c->y - a->y, det = abx * acy - aby * acx;
-    if (!(det > 1e-6f || det < -1e-6f))
-        return;
-    float inverse = 1 / det;
-    Vec4 ab = b->value - a->value, ac = c->value - a->value;
-    Vec4 dx = (ab * acy - ac * aby) * inverse, dy = (ac * abx - ab * acx) * inverse;
-    Vec4 start = a->value + (0.5f - a->x) * dx + (0.5f - a->y) * dy;
-    int first_row = (int)ceilf(rf_max(a->y, region->y0) - 0.5f), end_row = (int)ceilf(rf_min(c->y, region->y1) - 0.5f);
-    if (end_row <= first_row)
-        return;
-    TriangleRows rows;
-    find_rows(region, a, b, c, start, dx, dy, first_row, end_row, extent, &rows);
-    for (int k = 0; k < end_row - first_row; ++k)
-        if (rows.end[k] > rows.first[k])
-            write_pixels(planes, (first_row + k) * RF_TILE_PITCH + rows.first[k], rows.end[k] - rows.first[k],
-                         rows.u[k], rows.v[k], rows.weight[k], dx);
-}
-
-RF_WIDE_BODY void rasterise(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, Extent *extent)
-{
-    assert(job->width <= RF_TILE_COLUMNS && job->height <= RF_TILE_ROWS);
-    for (int y = 0; y < RF_TILE_ROWS; ++y)
-    {
-        extent->first[y] = RF_TILE_COLUMNS;
-        extent->end[y] = 0;
-    }
-    Region region = region_of(job, grid);
-    Vertices vertices;
-    place_vertices(job, grid, &region, &vertices);
-    const uint8_t *outside = vertices.outside;
-    for (int j = 0; j + 1 < grid->n; ++j)
-        for (int i = 0; i + 1 < grid->n; ++i)
-        {
-            int k = j * grid->n + i;
-            if (outside[k] & outside[k + 1] & outside[k + grid->n] & outside[k + grid->n + 1])
-                continue;
-            Corner a = corner_of(grid, &vertices, i, j), b = corner_of(grid, &vertices, i + 1, j);
-            Corner c = corner_of(grid, &vertices, i, j + 1), d = corner_of(grid, &vertices, i + 1, j + 1);
-            rasterise_triangle(&region, &a, &b, &c, planes, extent);
-            rasterise_triangle(&region, &d, &c, &b, planes, extent);
-        }
+    return (end + WIDE - 1) / WIDE * WIDE;
 }
 
 // ---- weighing
@@ -342,42 +155,131 @@ RF_WIDE_BODY float kernel_power(float kernel, float sharpness, int power)
     return kernel > 0 ? fast_exp2(sharpness * fast_log2(rf_max(kernel, 1e-6f))) : 0;
 }
 
-// w = K_p K_g K_d F over a row. `power` is a constant at every call.
-RF_WIDE_BODY void weigh_row_with(const RfDrawJob *job, const RfDrawGrid *grid, float *restrict plane, int y, Row *row,
-                                 int power)
+// Turns K_g K_d into w = K_p K_g K_d F over a row of points. `power` is a constant at every call.
+RF_WIDE_BODY void weigh_row_with(const RfRasterArea *area, const RfDrawGrid *grid, float sharpness, int y, int first,
+                                 int end, int power, float *restrict weight)
 {
-    float inverse = 1 / job->spacing, cx = (grid->centre.x - job->origin.x) * inverse,
-          cy = (grid->centre.y - job->origin.y) * inverse;
-    float inverse_radius = job->spacing / grid->radius, dy = (float)y + 0.5f - cy, dy2 = dy * dy, fade = grid->fade,
-          sharpness = job->sharpness;
-    float *restrict weight = row->weight;
-    for (int block = row->first / WIDE * WIDE; block < row->end; block += WIDE)
+    float cx = (grid->centre.x - area->origin.x) / area->spacing, inverse_radius = area->spacing / grid->radius;
+    float dy = (((float)y + 0.5f) * area->row_spacing + area->origin.y - grid->centre.y) / area->spacing;
+    float dy2 = dy * dy, fade = grid->fade;
+    const int stop = whole_vectors(end);
 #pragma omp simd
-        for (int k = block; k < block + WIDE; ++k)
-        {
-            float dx = (float)k + 0.5f - cx;
-            float kernel = rf_max(1 - fast_root(dx * dx + dy2) * inverse_radius, 0);
-            weight[k] = kernel_power(kernel, sharpness, power) * plane[k] * fade;
-            plane[k] = 0;
-        }
+    for (int k = first / WIDE * WIDE; k < stop; ++k)
+    {
+        float dx = (float)k + 0.5f - cx;
+        float kernel = rf_max(1 - fast_root(dx * dx + dy2) * inverse_radius, 0);
+        weight[k] *= kernel_power(kernel, sharpness, power) * fade;
+    }
 }
 
-// `others`: summed weights of the grids drawn before, or NULL.
-RF_WIDE_BODY void weigh_row(const RfDrawJob *job, const RfDrawGrid *grid, float *plane, const float *others, int y,
-                            Row *row)
+RF_WIDE_BODY void weigh_row(const RfRasterArea *area, const RfDrawGrid *grid, float sharpness, int y, int first,
+                            int end, float *weight)
 {
-    if (job->sharpness == 1)
-        weigh_row_with(job, grid, plane, y, row, 1);
-    else if (job->sharpness == 2)
-        weigh_row_with(job, grid, plane, y, row, 2);
-    else if (job->sharpness == 1.5f)
-        weigh_row_with(job, grid, plane, y, row, 3);
+    if (sharpness == 1)
+        weigh_row_with(area, grid, sharpness, y, first, end, 1, weight);
+    else if (sharpness == 2)
+        weigh_row_with(area, grid, sharpness, y, first, end, 2, weight);
+    else if (sharpness == 1.5f)
+        weigh_row_with(area, grid, sharpness, y, first, end, 3, weight);
     else
-        weigh_row_with(job, grid, plane, y, row, 0);
-    while (row->first < row->end && !(row->weight[row->first] > (others ? NEGLIGIBLE * others[row->first] : 0)))
-        ++row->first;
-    while (row->first < row->end && !(row->weight[row->end - 1] > (others ? NEGLIGIBLE * others[row->end - 1] : 0)))
-        --row->end;
+        weigh_row_with(area, grid, sharpness, y, first, end, 0, weight);
+}
+
+// ---- rows between
+
+// Where u, v and w of a grid are taken: at every step-th row of the tile.
+typedef struct Rows
+{
+    int step;
+    RfRasterArea area;
+    RfRasterExtent extent;
+} Rows;
+
+RF_WIDE_BODY RfRasterArea coarse_area(const RfRasterArea *pixels)
+{
+    // The first row stays on the first pixels' centres.
+    float shift = 0.5f * (float)(1 - COARSE_STEP) * pixels->spacing;
+    return (RfRasterArea){{pixels->origin.x, pixels->origin.y + shift},
+                          pixels->spacing,
+                          pixels->spacing * COARSE_STEP,
+                          pixels->width,
+                          (pixels->height + COARSE_STEP - 2) / COARSE_STEP + 1};
+}
+
+// Coordinates of the grid's mean deformation.
+RF_WIDE_BODY void fill_coordinates(const RfRasterArea *area, const RfDrawGrid *grid, RfRasterPlanes *planes)
+{
+    const float *s = grid->stretch;
+    float det = s[0] * s[3] - s[1] * s[2], inverse = det > 1e-6f ? 1 / det : 0;
+    float dux = s[3] * inverse * area->spacing, dvx = -s[2] * inverse * area->spacing;
+    float x0 = area->origin.x - grid->centre.x + 0.5f * area->spacing, middle = 0.5f * (float)(grid->n - 1);
+    for (int y = 0; y < area->height; ++y)
+    {
+        float dy = ((float)y + 0.5f) * area->row_spacing + area->origin.y - grid->centre.y;
+        float u0 = grid->u0 + middle * grid->cell + (x0 * s[3] - dy * s[1]) * inverse;
+        float v0 = grid->v0 + middle * grid->cell + (dy * s[0] - x0 * s[2]) * inverse;
+        float *restrict u = planes->u + y * RF_TILE_PITCH, *restrict v = planes->v + y * RF_TILE_PITCH;
+#pragma omp simd
+        for (int x = 0; x < RF_TILE_PITCH; ++x)
+        {
+            u[x] = u0 + (float)x * dux;
+            v[x] = v0 + (float)x * dvx;
+        }
+    }
+}
+
+RF_WIDE_BODY void make_rows(const RfDrawJob *job, const RfDrawGrid *grid, RfRasterPlanes *planes, Rows *rows)
+{
+    rows->step = grid->cell >= COARSE_CELL * job->area.spacing ? COARSE_STEP : 1;
+    rows->area = rows->step == 1 ? job->area : coarse_area(&job->area);
+    RfRasterExtent *extent = &rows->extent;
+    fill_coordinates(&rows->area, grid, planes);
+    // A point above or below the circle has a neighbour inside it.
+    float reach = grid->radius + (rows->step > 1 ? rows->area.row_spacing : 0);
+    rf_rasterise(&rows->area, grid, reach, planes, extent);
+    for (int y = 0; y < rows->area.height; ++y)
+        weigh_row(&rows->area, grid, job->sharpness, y, extent->first[y], extent->end[y],
+                  planes->weight + y * RF_TILE_PITCH);
+}
+
+RF_WIDE_BODY void clear_rows(const Rows *rows, RfRasterPlanes *planes)
+{
+    for (int y = 0; y < rows->area.height; ++y)
+        if (rows->extent.end[y] > rows->extent.first[y])
+            memset(planes->weight + y * RF_TILE_PITCH + rows->extent.first[y], 0,
+                   (size_t)(rows->extent.end[y] - rows->extent.first[y]) * sizeof(float));
+}
+
+// Row y of the tile, between two rows of the planes; false where the grid does not show. Left out are pixels where
+// `others`, the summed weights of the grids drawn before, outweigh this grid.
+RF_WIDE_BODY bool take_row(const Rows *rows, const RfRasterPlanes *planes, const float *restrict others, int y,
+                           Row *row)
+{
+    int j = y / rows->step, next = j * rows->step == y ? j : j + 1;
+    int start = rf_min_int(rows->extent.first[j], rows->extent.first[next]);
+    int end = rf_max_int(rows->extent.end[j], rows->extent.end[next]);
+    float t = (float)(y - j * rows->step) / (float)rows->step;
+    size_t upper = (size_t)j * RF_TILE_PITCH, lower = (size_t)next * RF_TILE_PITCH;
+    const float *restrict u0 = planes->u + upper, *restrict u1 = planes->u + lower;
+    const float *restrict v0 = planes->v + upper, *restrict v1 = planes->v + lower;
+    const float *restrict w0 = planes->weight + upper, *restrict w1 = planes->weight + lower;
+    float *restrict u = row->u, *restrict v = row->v, *restrict weight = row->weight;
+    int first = RF_TILE_COLUMNS, last = -1;
+    const int stop = whole_vectors(end);
+#pragma omp simd reduction(min : first) reduction(max : last)
+    for (int k = start / WIDE * WIDE; k < stop; ++k)
+    {
+        float w = w0[k] + t * (w1[k] - w0[k]);
+        bool shows = w > NEGLIGIBLE * others[k];
+        u[k] = u0[k] + t * (u1[k] - u0[k]);
+        v[k] = v0[k] + t * (v1[k] - v0[k]);
+        weight[k] = shows ? w : 0;
+        first = shows && k < first ? k : first;
+        last = shows && k > last ? k : last;
+    }
+    row->first = first;
+    row->end = last + 1;
+    return first <= last;
 }
 
 // ---- sampling
@@ -387,11 +289,12 @@ RF_WIDE_BODY Filter choose_filter(const RfDrawJob *job, const RfDrawGrid *grid)
 {
     const float *s = grid->stretch;
     float det = s[0] * s[3] - s[1] * s[2];
-    Filter filter = {rf_min_int(job->level_bias, job->texture->level_count - 1), 1, {0, 0}};
+    Filter filter = {rf_min_int(job->level_bias, job->texture->level_count - 1), 1, {0, 0}, {0, 0}};
     if (!(det > 1e-6f))
         return filter;
     // d(u, v) / d(x, y)
     float a = s[3] / det, b = -s[1] / det, c = -s[2] / det, d = s[0] / det, area = 1 / det;
+    filter.below = (RfVec2){b * job->area.spacing, d * job->area.spacing};
     float sum = a * a + b * b + c * c + d * d, root = sqrtf(rf_max(sum * sum - 4 * area * area, 0)),
           largest = sqrtf(0.5f * (sum + root));
     int level = 0;
@@ -405,7 +308,8 @@ RF_WIDE_BODY Filter choose_filter(const RfDrawJob *job, const RfDrawGrid *grid)
     // Taps at (k - (n - 1) / 2) step have the variance step^2 (n^2 - 1) / 12.
     float variance = (footprint * footprint - FREE_COMPRESSION * FREE_COMPRESSION) / 12;
     filter.taps = footprint < 2 ? 2 : footprint < 3 ? 3 : MAX_TAPS;
-    float step = sqrtf(12 * variance / (float)(filter.taps * filter.taps - 1)) * (float)(1 << level) * job->spacing;
+    float step =
+        sqrtf(12 * variance / (float)(filter.taps * filter.taps - 1)) * (float)(1 << level) * job->area.spacing;
     // The long axis in the exemplar: the eigenvector of J J^T to largest^2.
     float xx = a * a + b * b, xy = a * c + b * d, yy = c * c + d * d;
     float ex = xx >= yy ? largest * largest - yy : xy, ey = xx >= yy ? xy : largest * largest - xx,
@@ -415,8 +319,7 @@ RF_WIDE_BODY Filter choose_filter(const RfDrawJob *job, const RfDrawGrid *grid)
 }
 
 // Texel index and fractions over a row, shifted by one tap's offset.
-RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, const float *restrict u, const float *restrict v,
-                              RfVec2 shift, float share, Row *row)
+RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, RfVec2 shift, float share, Row *row)
 {
     float scale_x = level->scale_x, scale_y = level->scale_y, width = (float)level->width,
           height = (float)level->height;
@@ -425,30 +328,32 @@ RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, const flo
     // Where it tiles, rounding may give width itself: the padding holds the texel there.
     float last_x = tiles ? width : width - 1, last_y = tiles ? height : height - 1;
     int stride = level->stride;
-    const float *restrict weight = row->weight;
+    const float *restrict u = row->u, *restrict v = row->v, *restrict weight = row->weight;
     float *restrict left = row->left, *restrict right = row->right, *restrict fy = row->fy;
     int *restrict index = row->index;
-    for (int block = row->first / WIDE * WIDE; block < row->end; block += WIDE)
+    const int stop = whole_vectors(row->end);
 #pragma omp simd
-        for (int k = block; k < block + WIDE; ++k)
-        {
-            float s = u[k] * scale_x + shift_x, t = v[k] * scale_y + shift_y;
-            s -= width * floorf(s * inverse_width);
-            t -= height * floorf(t * inverse_height);
-            s = rf_min(rf_max(s, 0), last_x);
-            t = rf_min(rf_max(t, 0), last_y);
-            int i = (int)s, j = (int)t;
-            float w = weight[k] * share, w1 = w * (s - (float)i);
-            left[k] = w - w1;
-            right[k] = w1;
-            fy[k] = t - (float)j;
-            index[k] = j * stride + i;
-        }
+    for (int k = row->first / WIDE * WIDE; k < stop; ++k)
+    {
+        float s = u[k] * scale_x + shift_x, t = v[k] * scale_y + shift_y;
+        s -= width * floorf(s * inverse_width);
+        t -= height * floorf(t * inverse_height);
+        s = rf_min(rf_max(s, 0), last_x);
+        t = rf_min(rf_max(t, 0), last_y);
+        int i = (int)s, j = (int)t;
+        float w = weight[k] * share, w1 = w * (s - (float)i);
+        left[k] = w - w1;
+        right[k] = w1;
+        fy[k] = t - (float)j;
+        index[k] = j * stride + i;
+    }
 }
 
 // Sums one tap of one quad over a row. `turn` is a constant at every call, so the plain form pays nothing for it.
-RF_WIDE_BODY void sum_samples(const RfDrawGrid *grid, const float *restrict texels, int stride, const Row *row,
-                              float *restrict sums, int turn)
+// `ahead`, in floats: where the next row will read, or near it. A texture is larger than the caches next to the
+// processor, and rows are too short for it to guess: fetching early takes a seventh off the whole.
+RF_WIDE_BODY void sum_samples(const RfDrawGrid *grid, const float *restrict texels, int stride, ptrdiff_t ahead,
+                              const Row *row, float *restrict sums, int turn)
 {
     float c = grid->turn_cos, s = turn == 1 ? -grid->turn_sin : grid->turn_sin;
     const Vec8 along = {c, c, 1, 1, c, c, 1, 1}, across = {-s, s, 0, 0, -s, s, 0, 0};
@@ -456,6 +361,8 @@ RF_WIDE_BODY void sum_samples(const RfDrawGrid *grid, const float *restrict texe
     {
         const float *texel = texels + (size_t)row->index[k] * 4;
         Vec8 upper = *(const Vec8 *)texel, lower = *(const Vec8 *)(texel + (size_t)stride * 4);
+        // Two pixels share the lines that they read, so one asks for the upper and one for the lower texels.
+        __builtin_prefetch(texel + ahead + (k & 1 ? stride * 4 : 0));
         Vec8 r = upper + row->fy[k] * (lower - upper);
         if (turn)
         {
@@ -475,31 +382,33 @@ RF_WIDE_BODY void sum_row(const RfDrawJob *job, const RfDrawGrid *grid, const Fi
                           RfTileSums *sums)
 {
     const RfTextureLevel *level = &job->texture->levels[filter->level];
-    const float *u = sums->planes->u + y * RF_TILE_PITCH, *v = sums->planes->v + y * RF_TILE_PITCH;
     size_t place = (size_t)y * RF_TILE_COLUMNS;
+    ptrdiff_t ahead =
+        4 * (lrintf(filter->below.y * level->scale_y) * level->stride + lrintf(filter->below.x * level->scale_x));
     float share = 1 / (float)filter->taps;
     for (int tap = 0; tap < filter->taps; ++tap)
     {
         float along = (float)tap - 0.5f * (float)(filter->taps - 1);
-        find_texels(level, job->texture->tiles, u, v, (RfVec2){along * filter->step.x, along * filter->step.y}, share,
-                    row);
+        find_texels(level, job->texture->tiles, (RfVec2){along * filter->step.x, along * filter->step.y}, share, row);
         for (int q = 0; q < job->texture->quads; ++q)
         {
             const float *texels = level->texels + (size_t)q * rf_texture_plane(level);
             float *colour = sums->colour + ((size_t)q * TILE_PIXELS + place) * 4;
             if (job->turned[q] == 0)
-                sum_samples(grid, texels, level->stride, row, colour, 0);
+                sum_samples(grid, texels, level->stride, ahead, row, colour, 0);
             else if (job->turned[q] == 1)
-                sum_samples(grid, texels, level->stride, row, colour, 1);
+                sum_samples(grid, texels, level->stride, ahead, row, colour, 1);
             else
-                sum_samples(grid, texels, level->stride, row, colour, 2);
+                sum_samples(grid, texels, level->stride, ahead, row, colour, 2);
         }
     }
     float *restrict w1 = sums->weight + place, *restrict w2 = sums->weight2 + place,
                     *restrict levels = sums->level + place;
     const float *restrict weight = row->weight;
     float level_number = (float)filter->level;
-    for (int k = row->first; k < row->end; ++k)
+    const int stop = whole_vectors(row->end);
+#pragma omp simd
+    for (int k = row->first / WIDE * WIDE; k < stop; ++k)
     {
         w1[k] += weight[k];
         w2[k] += weight[k] * weight[k];
@@ -519,26 +428,22 @@ RF_WIDE_BODY void keep_lattice(const Row *row, int y, float *lattice)
 RF_WIDE_BODY void rf_tile_draw_body(const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice,
                                     int64_t *samples)
 {
-    Extent extent;
+    Rows rows;
     Filter filter = choose_filter(job, grid);
     if (lattice)
         memset(lattice, 0, RF_LATTICE_POINTS * sizeof *lattice);
-    rasterise(job, grid, sums->planes, &extent);
-    for (int y = 0; y < job->height; ++y)
+    make_rows(job, grid, sums->planes, &rows);
+    for (int y = 0; y < job->area.height; ++y)
     {
         Row row;
-        row.first = extent.first[y];
-        row.end = extent.end[y];
-        if (row.first >= row.end)
-            continue;
-        weigh_row(job, grid, sums->planes->weight + y * RF_TILE_PITCH, sums->weight + y * RF_TILE_COLUMNS, y, &row);
-        if (row.first >= row.end)
+        if (!take_row(&rows, sums->planes, sums->weight + y * RF_TILE_COLUMNS, y, &row))
             continue;
         sum_row(job, grid, &filter, y, &row, sums);
         *samples += (int64_t)(row.end - row.first) * filter.taps;
         if (lattice && y % RF_LATTICE_STEP == 0)
             keep_lattice(&row, y, lattice);
     }
+    clear_rows(&rows, sums->planes);
 }
 
 RF_WIDE(rf_tile_draw,
@@ -568,24 +473,23 @@ RF_WIDE_BODY void insert_layer(RfTileLayer *layer, float u, float v, float weigh
     layer->id[slot] = (int32_t)id;
 }
 
-RF_WIDE_BODY void rf_tile_layers_body(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes,
+RF_WIDE_BODY void rf_tile_layers_body(const RfDrawJob *job, const RfDrawGrid *grid, RfRasterPlanes *planes,
                                       RfTileLayer *layers)
 {
-    Extent extent;
-    rasterise(job, grid, planes, &extent);
-    for (int y = 0; y < job->height; ++y)
+    static const float none[RF_TILE_PITCH];
+    Rows rows;
+    make_rows(job, grid, planes, &rows);
+    for (int y = 0; y < job->area.height; ++y)
     {
         Row row;
-        row.first = extent.first[y];
-        row.end = extent.end[y];
-        if (row.first >= row.end)
+        if (!take_row(&rows, planes, none, y, &row))
             continue;
-        weigh_row(job, grid, planes->weight + y * RF_TILE_PITCH, NULL, y, &row);
         for (int x = row.first; x < row.end; ++x)
-            insert_layer(&layers[y * RF_TILE_COLUMNS + x], planes->u[y * RF_TILE_PITCH + x],
-                         planes->v[y * RF_TILE_PITCH + x], row.weight[x], grid->id);
+            if (row.weight[x] > 0)
+                insert_layer(&layers[y * RF_TILE_COLUMNS + x], row.u[x], row.v[x], row.weight[x], grid->id);
     }
+    clear_rows(&rows, planes);
 }
 
-RF_WIDE(rf_tile_layers, (const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, RfTileLayer *layers),
+RF_WIDE(rf_tile_layers, (const RfDrawJob *job, const RfDrawGrid *grid, RfRasterPlanes *planes, RfTileLayer *layers),
         (job, grid, planes, layers))

@@ -4,47 +4,17 @@
 #pragma once
 
 #include "core/memory.h"
+#include "kernels/rasterising.h"
 #include "kernels/texture.h"
 
 enum
 {
-    /// Pixels of a tile: wide rather than square, since its rows are what is worked on. A tile is drawn with one more
-    /// row and column, so that the lattice below reaches its border.
-    RF_TILE_WIDTH = 128,
-    RF_TILE_HEIGHT = 64,
-    RF_TILE_COLUMNS = RF_TILE_WIDTH + 1,
-    RF_TILE_ROWS = RF_TILE_HEIGHT + 1,
-    /// Row stride of a tile's planes: whole vectors.
-    RF_TILE_PITCH = (RF_TILE_COLUMNS + 15) / 16 * 16,
     /// Weights of single grids are kept at every RF_LATTICE_STEP-th pixel, for the correlation of grids that overlap.
     RF_LATTICE_STEP = 8,
     RF_LATTICE_COLUMNS = RF_TILE_WIDTH / RF_LATTICE_STEP + 1,
     RF_LATTICE_ROWS = RF_TILE_HEIGHT / RF_LATTICE_STEP + 1,
     RF_LATTICE_POINTS = RF_LATTICE_COLUMNS * RF_LATTICE_ROWS
 };
-
-/// A grid as drawing sees it. Vertex (i, j) is number j * n + i and stands for the exemplar coordinates u0 + i * cell,
-/// v0 + j * cell.
-typedef struct RfDrawGrid
-{
-    const float *x, *y;
-    /// K_d at the vertices.
-    const float *quality;
-    int n;
-    float u0, v0, cell;
-    /// Frame pixels an exemplar pixel, averaged over the grid: d(x, y) / d(u, v), row by row. Chooses the filter.
-    float stretch[4];
-    /// Of the kernel K_p.
-    RfVec2 centre;
-    float radius;
-    /// F_in F_out.
-    float fade;
-    /// Cosine and sine of the grid's turn, for direction maps.
-    float turn_cos, turn_sin;
-    /// Bounding box of what can be seen of it.
-    float x0, y0, x1, y1;
-    uint32_t id;
-} RfDrawGrid;
 
 typedef struct RfDrawJob
 {
@@ -53,21 +23,11 @@ typedef struct RfDrawJob
     float sharpness;
     /// For each quad: 0 as it is; 1 normals (x right, y up); 2 vectors (x right, y down), turned with the grid.
     int turned[RF_TEXTURE_QUADS];
-    /// Pixel (i, j) of the tile is centred on origin + (i + 0.5, j + 0.5) * spacing; width <= RF_TILE_COLUMNS, height
-    /// <= RF_TILE_ROWS.
-    RfVec2 origin;
-    float spacing;
-    int width, height;
+    /// The tile's pixels.
+    RfRasterArea area;
     /// Added to the texture level that each triangle asks for: log2 of the spacing.
     int level_bias;
 } RfDrawJob;
-
-/// One grid's coordinates and K_g K_d over a tile, between rasterising and sampling; `weight` is 0 everywhere between
-/// two grids.
-typedef struct RfTilePlanes
-{
-    float u[RF_TILE_ROWS * RF_TILE_PITCH], v[RF_TILE_ROWS * RF_TILE_PITCH], weight[RF_TILE_ROWS * RF_TILE_PITCH];
-} RfTilePlanes;
 
 /// Sums over the grids drawn so far. colour: [quads][RF_TILE_ROWS * RF_TILE_COLUMNS][4], of w (T - m); the others:
 /// [RF_TILE_ROWS * RF_TILE_COLUMNS], row stride RF_TILE_COLUMNS.
@@ -77,7 +37,7 @@ typedef struct RfTileSums
     float *weight, *weight2;
     /// Of w times the texture level.
     float *level;
-    RfTilePlanes *planes;
+    RfRasterPlanes *planes;
 } RfTileSums;
 
 /// Memory for the sums of one tile, of which the first `rows` rows are cleared and may be drawn.
@@ -96,4 +56,4 @@ typedef struct RfTileLayer
     float total;
 } RfTileLayer;
 
-void rf_tile_layers(const RfDrawJob *job, const RfDrawGrid *grid, RfTilePlanes *planes, RfTileLayer *layers);
+void rf_tile_layers(const RfDrawJob *job, const RfDrawGrid *grid, RfRasterPlanes *planes, RfTileLayer *layers);

@@ -7,6 +7,7 @@
 
 #include "core/maths.h"
 #include "core/memory.h"
+#include "core/result.h"
 
 enum
 {
@@ -59,19 +60,19 @@ static double whole_difference(const Comparison *c)
 }
 
 // Rms over one block; negative if less than half of it counts.
-static double block_difference(const Comparison *c, int x0, int y0)
+static double block_difference(const Comparison *c, int block, int x0, int y0)
 {
     double sum = 0;
     int n = 0;
-    for (int i = 0; i < BLOCK * BLOCK; ++i)
+    for (int i = 0; i < block * block; ++i)
     {
-        size_t k = (size_t)(y0 + i / BLOCK) * (size_t)c->w + (size_t)(x0 + i % BLOCK);
+        size_t k = (size_t)(y0 + i / block) * (size_t)c->w + (size_t)(x0 + i % block);
         if (!c->counted[k])
             continue;
         sum += (double)(c->a[k] - c->b[k]) * (double)(c->a[k] - c->b[k]);
         ++n;
     }
-    return n >= BLOCK * BLOCK / 2 ? sqrt(sum / n) * c->scale : -1;
+    return 2 * n >= block * block ? sqrt(sum / n) * c->scale : -1;
 }
 
 static void raise_block(const Comparison *c, int x0, int y0, float value)
@@ -93,7 +94,7 @@ static Difference difference(const Comparison *c)
     for (int y0 = 0; y0 + BLOCK <= c->h; y0 += BLOCK / 2)
         for (int x0 = 0; x0 + BLOCK <= c->w; x0 += BLOCK / 2)
         {
-            double value = block_difference(c, x0, y0);
+            double value = block_difference(c, BLOCK, x0, y0);
             if (value < 0)
                 continue;
             if (c->block_map)
@@ -122,6 +123,16 @@ static void compare(const RfFramePair *pair, const float *carried, const float *
                               .block_y = block ? now.block_y : (double)NAN};
 }
 
+// a carried to b, and the pixels that count there: seen from b, since that is where frames are compared.
+static RfResult carry(const RfFramePair *pair, const float *displacement, float *backward, float *carried,
+                      uint8_t *counted)
+{
+    RfFramePair turned = {pair->w, pair->h, pair->b, pair->a, pair->mask_b, pair->mask_a};
+    RF_TRY(rf_measure_invert(displacement, pair->w, pair->h, backward));
+    RF_TRY(rf_measure_counted(&turned, backward, counted));
+    return rf_measure_warp(pair->a, backward, pair->w, pair->h, carried);
+}
+
 RfResult rf_measure_flicker(const RfFramePair *pair, const float *displacement, float *difference_map, float *block_map,
                             RfMeasureFlicker *out)
 {
@@ -130,21 +141,33 @@ RfResult rf_measure_flicker(const RfFramePair *pair, const float *displacement, 
     float *backward = rf_allocate(count, 2 * sizeof(float));
     float *carried = rf_allocate(count, sizeof(float)), *back = rf_allocate(count, sizeof(float));
     uint8_t *counted = rf_allocate(count, 1);
-    RfFramePair turned = {w, h, pair->b, pair->a, pair->mask_b, pair->mask_a};
     RfResult result = backward && carried && back && counted ? RF_OK : RF_OUT_OF_MEMORY;
     if (result == RF_OK)
-        result = rf_measure_invert(displacement, w, h, backward);
-    // Seen from frame n + 1, since that is where frames are compared.
-    if (result == RF_OK)
-        result = rf_measure_counted(&turned, backward, counted);
-    if (result == RF_OK)
-        result = rf_measure_warp(pair->a, backward, w, h, carried);
+        result = carry(pair, displacement, backward, carried, counted);
     if (result == RF_OK)
         result = rf_measure_warp(carried, displacement, w, h, back);
     if (result == RF_OK)
         compare(pair, carried, back, counted, difference_map, block_map, out);
     rf_release(counted);
     rf_release(back);
+    rf_release(carried);
+    rf_release(backward);
+    return result;
+}
+
+RfResult rf_measure_block_changes(const RfFramePair *pair, const float *displacement, int block, float *changes)
+{
+    size_t count = (size_t)pair->w * (size_t)pair->h;
+    float *backward = rf_allocate(count, 2 * sizeof(float)), *carried = rf_allocate(count, sizeof(float));
+    uint8_t *counted = rf_allocate(count, 1);
+    RfResult result = backward && carried && counted ? RF_OK : RF_OUT_OF_MEMORY;
+    if (result == RF_OK)
+        result = carry(pair, displacement, backward, carried, counted);
+    Comparison c = {pair->b, carried, counted, pair->w, pair->h, 1, NULL, NULL};
+    int columns = pair->w / block, rows = pair->h / block;
+    for (int k = 0; k < columns * rows && result == RF_OK; ++k)
+        changes[k] = (float)block_difference(&c, block, k % columns * block, k / columns * block);
+    rf_release(counted);
     rf_release(carried);
     rf_release(backward);
     return result;

@@ -24,6 +24,10 @@ RfResult rf_measure_flow_error(RfMeasureEstimator estimator, const RfFramePair *
 RfResult rf_measure_flicker(const RfFramePair *pair, const float *displacement, float *difference_map, float *block_map,
                             RfMeasureFlicker *out);
 
+/// Rms difference between b and a carried by the flow in each block of `block` x `block` pixels, in grey levels: [h /
+/// block][w / block], row by row; -1 where less than half of a block counts. What pops stands out from the rest.
+RfResult rf_measure_block_changes(const RfFramePair *pair, const float *displacement, int block, float *changes);
+
 /// Only pixels in the mask count. Without floors.
 void rf_measure_contrast(const RfImageView *frame, const uint8_t *mask, const RfImageView *exemplar,
                          RfMeasureContrast *out);

@@ -26,6 +26,7 @@ enum
 {
     MAX_WINDOWS = 4096,
     MAX_COPIES = 72 * 4,
+    STRIP_WINDOWS = 1 << 20,
     CELLS = RF_MEASURE_USE_CELLS
 };
 
@@ -244,6 +245,14 @@ RfResult rf_patches_create(const RfImageView *exemplar, int size, int stride, in
                            RfPatchJudge **out)
 {
     *out = NULL;
+    int64_t candidates =
+        windows_at_stride(exemplar->width, exemplar->height, size, 1) * rotations * (half_pixel ? 4 : 1);
+    if (candidates > RF_MAX_WINDOW_CANDIDATES)
+        return rf_fail(
+            RF_UNSUPPORTED, NULL, "patch distance",
+            "%lld windows of the exemplar in all its copies, at most %d are possible: take fewer rotations, a "
+            "smaller exemplar, or patch-every 0",
+            (long long)candidates, RF_MAX_WINDOW_CANDIDATES);
     RfPatchJudge *judge = rf_allocate_zero(1, sizeof *judge);
     if (!judge)
         return RF_OUT_OF_MEMORY;
@@ -384,29 +393,58 @@ static RfResult search_copy(const RfPatchJudge *judge, const RfWindowDatabase *f
     return result;
 }
 
+// Rows y0 to y1 of a frame as a picture of its own; false if no whole window of it is known.
+static bool cut_strip(const RfPatchJudge *judge, const RfImageView *frame, const uint8_t *known, int y0, int y1,
+                      RfWindowSource *strip)
+{
+    *strip = (RfWindowSource){*frame, known ? known + (size_t)y0 * (size_t)frame->width : NULL, NULL};
+    strip->image.pixels += (ptrdiff_t)y0 * frame->row_stride;
+    strip->image.height = y1 - y0;
+    for (int y = 0; y + judge->size <= y1 - y0; ++y)
+        for (int x = 0; x + judge->size <= frame->width; ++x)
+            if (is_known(strip->valid, frame->width, x, y, judge->size))
+                return true;
+    return false;
+}
+
+// Lowers the least distances by the windows of a strip.
+static RfResult search_strip(const RfPatchJudge *judge, const RfWindowSource *strip, float *windows,
+                             RfWindowMatch *matches, double *least)
+{
+    RfWindowOptions options = {.side = judge->size};
+    RfWindowDatabase *database = NULL;
+    RfResult result = rf_windows_create(strip, 1, &options, &database);
+    for (int copy = 0; copy < judge->copies && result == RF_OK; ++copy)
+        result = search_copy(judge, database, copy, windows, matches, least);
+    rf_windows_destroy(database);
+    return result;
+}
+
+// A database of windows takes some 150 bytes each, so that large frames are searched strip by strip.
 static RfResult find_missing(const RfPatchJudge *judge, const RfImageView *frame, const uint8_t *known,
                              RfMeasurePatch *out)
 {
     size_t count = (size_t)judge->grid.count, numbers = (size_t)rf_windows_numbers(judge->database);
-    RfWindowSource source = {*frame, known, NULL};
-    RfWindowOptions options = {.side = judge->size};
-    RfWindowDatabase *database = NULL;
-    RF_TRY(rf_windows_create(&source, 1, &options, &database));
     float *windows = rf_allocate(count, numbers * sizeof(float));
     RfWindowMatch *matches = rf_allocate(count, sizeof *matches);
     double *least = rf_allocate(count, sizeof *least), squares = 0;
     RfResult result = windows && matches && least ? RF_OK : RF_OUT_OF_MEMORY;
     for (size_t i = 0; i < count && result == RF_OK; ++i)
         least[i] = HUGE_VAL;
-    for (int copy = 0; copy < judge->copies && result == RF_OK; ++copy)
-        result = search_copy(judge, database, copy, windows, matches, least);
+    int rows = rf_max_int(STRIP_WINDOWS / frame->width, 1), overlap = judge->size - 1;
+    for (int y = 0; y + overlap < frame->height && result == RF_OK; y += rows)
+    {
+        RfWindowSource strip;
+        if (cut_strip(judge, frame, known, y, rf_min_int(y + rows + overlap, frame->height), &strip))
+            result = search_strip(judge, &strip, windows, matches, least);
+    }
     for (size_t i = 0; i < count && result == RF_OK; ++i)
         squares += least[i];
-    out->missing = levels(squares, (double)count, (int)numbers);
+    if (result == RF_OK)
+        out->missing = levels(squares, (double)count, (int)numbers);
     rf_release(least);
     rf_release(matches);
     rf_release(windows);
-    rf_windows_destroy(database);
     return result;
 }
 

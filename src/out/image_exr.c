@@ -119,6 +119,15 @@ static bool is_colour(const char *name)
     return name[0] != '\0' && name[1] == '\0' && strchr("RGBY", name[0]);
 }
 
+// A half ends at 65504; beyond, the library would write infinity, which is refused when it is read.
+static void limit_to_half(float *numbers, size_t count)
+{
+    const float largest = 65504;
+    for (size_t i = 0; i < count; ++i)
+        if (fabsf(numbers[i]) > largest && isfinite(numbers[i]))
+            numbers[i] = copysignf(largest, numbers[i]);
+}
+
 static void convert_lines(const ExrWriting *writing, ExrChunk *chunk)
 {
     size_t row = (size_t)writing->view.width * (size_t)writing->view.channels;
@@ -126,15 +135,16 @@ static void convert_lines(const ExrWriting *writing, ExrChunk *chunk)
         memcpy(chunk->lines + (size_t)y * row,
                writing->view.pixels + (ptrdiff_t)(chunk->info.start_y + y) * writing->view.row_stride,
                row * sizeof(float));
-    if (rf_image_encoding(writing->image) != RF_ENCODING_SRGB)
-        return;
     for (int c = 0; c < writing->view.channels; ++c)
     {
-        if (!is_colour(rf_image_channel_name(writing->image, c)))
+        if (rf_image_encoding(writing->image) != RF_ENCODING_SRGB ||
+            !is_colour(rf_image_channel_name(writing->image, c)))
             continue;
         for (size_t i = (size_t)c; i < row * (size_t)chunk->info.height; i += (size_t)writing->view.channels)
             chunk->lines[i] = rf_srgb_to_linear(chunk->lines[i]);
     }
+    if (rf_image_format(writing->image) == RF_SAMPLE_HALF)
+        limit_to_half(chunk->lines, row * (size_t)chunk->info.height);
 }
 
 static int channel_named(const ExrWriting *writing, const char *name)

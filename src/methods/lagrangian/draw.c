@@ -221,12 +221,11 @@ static void interpolate_rho(const float *lattice, int y, float *row)
 {
     const float *upper = lattice + y / RF_LATTICE_STEP * RF_LATTICE_COLUMNS, *lower = upper + RF_LATTICE_COLUMNS;
     float t = (float)(y % RF_LATTICE_STEP) / RF_LATTICE_STEP;
-    for (int x = 0; x < RF_TILE_WIDTH; ++x)
+    for (int i = 0; i + 1 < RF_LATTICE_COLUMNS; ++i, row += RF_LATTICE_STEP)
     {
-        int i = x / RF_LATTICE_STEP;
-        float s = (float)(x % RF_LATTICE_STEP) / RF_LATTICE_STEP;
         float left = upper[i] + t * (lower[i] - upper[i]), right = upper[i + 1] + t * (lower[i + 1] - upper[i + 1]);
-        row[x] = left + s * (right - left);
+        for (int k = 0; k < RF_LATTICE_STEP; ++k)
+            row[k] = left + (float)k * (1.0f / RF_LATTICE_STEP) * (right - left);
     }
 }
 
@@ -328,10 +327,7 @@ static void draw_tile(void *context, int tile, int worker)
     int x0 = tile % job->columns * RF_TILE_WIDTH, y0 = tile / job->columns * RF_TILE_HEIGHT;
     RfDrawJob draw = {.texture = &l->material.texture,
                       .sharpness = l->options.sharpness,
-                      .origin = {(float)x0, (float)y0},
-                      .spacing = 1,
-                      .width = RF_TILE_COLUMNS,
-                      .height = RF_TILE_ROWS};
+                      .area = {{(float)x0, (float)y0}, 1, 1, RF_TILE_COLUMNS, RF_TILE_ROWS}};
     memcpy(draw.turned, l->material.turned, sizeof draw.turned);
     const int *order = job->order + job->first[tile];
     int count = job->first[tile + 1] - job->first[tile], correlated = rf_min_int(count, MAX_CORRELATED);
@@ -386,7 +382,7 @@ typedef struct LayersJob
     const RfLagrangian *l;
     RfImageView layers;
     RfTileLayer *tiles[RF_MAX_THREADS];
-    RfTilePlanes *planes;
+    RfRasterPlanes *planes;
     int columns;
 } LayersJob;
 
@@ -417,18 +413,19 @@ static void layer_tile(void *context, int tile, int worker)
     int x0 = tile % job->columns * RF_TILE_WIDTH, y0 = tile / job->columns * RF_TILE_HEIGHT;
     RfDrawJob draw = {.texture = &l->material.texture,
                       .sharpness = l->options.sharpness,
-                      .origin = {(float)x0, (float)y0},
-                      .spacing = 1,
-                      .width = rf_min_int(RF_TILE_WIDTH, l->width - x0),
-                      .height = rf_min_int(RF_TILE_HEIGHT, l->height - y0)};
+                      .area = {{(float)x0, (float)y0},
+                               1,
+                               1,
+                               rf_min_int(RF_TILE_WIDTH, l->width - x0),
+                               rf_min_int(RF_TILE_HEIGHT, l->height - y0)}};
     for (int g = 0; g < l->count; ++g)
     {
         RfDrawGrid grid = rf_lagrangian_draw_grid_of(l, g, l->time);
-        if (grid.fade > 0 && grid.x1 > (float)x0 && grid.y1 > (float)y0 && grid.x0 < (float)(x0 + draw.width) &&
-            grid.y0 < (float)(y0 + draw.height))
+        if (grid.fade > 0 && grid.x1 > (float)x0 && grid.y1 > (float)y0 && grid.x0 < (float)(x0 + draw.area.width) &&
+            grid.y0 < (float)(y0 + draw.area.height))
             rf_tile_layers(&draw, &grid, &job->planes[worker], layers);
     }
-    write_layers(job, layers, x0, y0, draw.width, draw.height);
+    write_layers(job, layers, x0, y0, draw.area.width, draw.area.height);
 }
 
 RfResult rf_lagrangian_layers(const RfLagrangian *l, const RfImageView *layers)

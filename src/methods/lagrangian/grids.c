@@ -3,6 +3,9 @@
 //
 // Sorkine, Cohen-Or, Goldenthal, Lischinski. Bounded-distortion piecewise mesh parameterization. 2002 (delta of a
 // triangle).
+//
+// Deviation: a vertex that loses its last triangle to the land or the border keeps the K_d it had. With the paper's 1 a
+// worn grid flashes up along the bank from one frame to the next.
 
 #include "methods/lagrangian/lagrangian.h"
 
@@ -20,6 +23,10 @@
 // A fade takes this share of the time that the local strain leaves it: less flickers, more smears and draws more
 // layers.
 #define FADE_SHARE 0.6f
+
+// A fade takes this long at least, in seconds, however fast the flow strains: 12 frames at 24 a second. Left to the
+// strain alone fades of 5 frames swap a fifth of the picture from one frame to the next (bench_pops).
+#define LEAST_FADE 0.5f
 
 RfResult rf_lagrangian_grids_reserve(RfLagrangian *l, int capacity)
 {
@@ -82,22 +89,22 @@ static bool add_triangle(const Vertices *v, const bool *inside, const int corner
     return isinf(delta);
 }
 
-// K_d at every vertex: the mean quality of its triangles, 1 where it has none. True if a triangle folds.
+// K_d at every vertex: the mean quality of its triangles, what it was where it has none. True if a triangle folds.
 static bool measure_quality(const RfLagrangian *l, const Vertices *v, const bool *inside, float *quality)
 {
     int n = v->n, count[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES] = {0};
     bool folded = false;
-    memset(quality, 0, (size_t)(n * n) * sizeof *quality);
+    float sum[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES] = {0};
     for (int j = 0; j + 1 < n; ++j)
         for (int i = 0; i + 1 < n; ++i)
         {
             int a = j * n + i;
             const int upper[3] = {a, a + 1, a + n}, lower[3] = {a + n + 1, a + n, a + 1};
-            folded |= add_triangle(v, inside, upper, 1, l->cell, l->options.max_distortion, quality, count);
-            folded |= add_triangle(v, inside, lower, -1, l->cell, l->options.max_distortion, quality, count);
+            folded |= add_triangle(v, inside, upper, 1, l->cell, l->options.max_distortion, sum, count);
+            folded |= add_triangle(v, inside, lower, -1, l->cell, l->options.max_distortion, sum, count);
         }
     for (int k = 0; k < n * n; ++k)
-        quality[k] = count[k] > 0 ? quality[k] / (float)count[k] : 1;
+        quality[k] = count[k] > 0 ? sum[k] / (float)count[k] : quality[k];
     return folded;
 }
 
@@ -153,9 +160,10 @@ static void measure_deformation(const Vertices *v, float cell, Grid *grid)
 }
 
 // Rate of strain from differences over one radius: the larger eigenvalue of the symmetric part of the velocity's
-// gradient, its trace removed.
-static float measure_strain(const RfLagrangian *l, const StepFlow *flow, RfVec2 centre)
+// gradient, its trace removed. Where nothing is known along an axis the grid's last value stands.
+static float measure_strain(const RfLagrangian *l, const StepFlow *flow, const Grid *grid)
 {
+    RfVec2 centre = grid->centre;
     float h = 0.5f * l->radius, blend = rf_flow_blend(flow->view, flow->view->time);
     RfVec2 difference[2];
     for (int axis = 0; axis < 2; ++axis)
@@ -169,8 +177,8 @@ static float measure_strain(const RfLagrangian *l, const StepFlow *flow, RfVec2 
             inside[k] = rf_flow_velocity(flow->view, p, flow->scale_x, flow->scale_y, blend, &ends[k]);
         }
         if (!inside[0] && !inside[1])
-            ends[0] = ends[1] = known;
-        else if (!inside[0] || !inside[1])
+            return grid->strain;
+        if (!inside[0] || !inside[1])
         {
             // One side only: the difference to the centre, doubled.
             int in = inside[0] ? 0 : 1;
@@ -206,11 +214,11 @@ static void measure_grid(RfLagrangian *l, const StepFlow *flow, int index, const
         grid->inside_count += inside[k];
         grid->least_quality = fminf(grid->least_quality, quality[k]);
         grid->greatest_quality = fmaxf(grid->greatest_quality, quality[k]);
-        if (quality[k] < 0.5f && rf_vec2_length(rf_vec2_sub(vertex(&v, k), grid->centre)) < l->radius)
+        if (inside[k] && quality[k] < 0.5f && rf_vec2_length(rf_vec2_sub(vertex(&v, k), grid->centre)) < l->radius)
             grid->worn = true;
     }
     measure_deformation(&v, l->cell, grid);
-    grid->strain = measure_strain(l, flow, grid->centre);
+    grid->strain = measure_strain(l, flow, grid);
 }
 
 typedef struct AdvectJob
@@ -245,13 +253,15 @@ void rf_lagrangian_grids_measure_new(RfLagrangian *l, const StepFlow *flow, int 
     advect_one(&job, index, 0);
 }
 
-float rf_lagrangian_fade_length(const RfLagrangian *l, float strain)
+float rf_lagrangian_fade_length(const RfLagrangian *l, float strain, float others)
 {
-    float longest = l->options.fade * l->options.fps, limit = l->options.max_distortion;
+    float longest = l->options.fade * l->options.fps, least = fminf(LEAST_FADE * l->options.fps, longest);
+    float limit = l->options.max_distortion;
     // A grid is retired at delta = (1 + delta_max) / 2 and has no weight left at delta_max. Pure strain e takes
     // ln(delta_max / delta) / e from one to the other.
     float left = strain > 0 ? FADE_SHARE * logf(2 * limit / (1 + limit)) / strain : longest;
-    return rf_lerp(longest, fminf(longest, left), l->options.adapt);
+    left = rf_lerp(least, rf_clamp(left, least, longest), others);
+    return others > 0 ? rf_lerp(longest, left, l->options.adapt) : least;
 }
 
 static void retire(RfLagrangian *l, int index, double time)
@@ -259,7 +269,7 @@ static void retire(RfLagrangian *l, int index, double time)
     Grid *grid = &l->grids[index];
     grid->retired = true;
     grid->retirement = time;
-    grid->fade_out = rf_lagrangian_fade_length(l, grid->strain);
+    grid->fade_out = rf_lagrangian_fade_length(l, grid->strain, 1);
     ++l->stats.retired;
 }
 

@@ -34,7 +34,7 @@ static const RfOption option_table[] = {
      "d^2."},
     {"grid-vertices", RF_OPTION_INT, FIELD(grid_vertices), "", 4, 32, 8, NULL,
      "Vertices along a side of a grid. More bend with finer motion; cost grows as the square."},
-    {"max-distortion", RF_OPTION_FLOAT, FIELD(max_distortion), "", 1.05, 100, 2.05, NULL,
+    {"max-distortion", RF_OPTION_FLOAT, FIELD(max_distortion), "", 1.05, 100, 1.95, NULL,
      "Stretch or squash at which a texture is invisible. Smaller keeps the exemplar's look, larger follows the flow "
      "for longer."},
     {"fade", RF_OPTION_FLOAT, FIELD(fade), "s", 0, 1000, 5, NULL, "Longest time a grid takes to fade in or out."},
@@ -67,7 +67,7 @@ RfLagrangianOptions rf_lagrangian_defaults(void)
                                  .seed = 1,
                                  .particle_radius = 0,
                                  .grid_vertices = 8,
-                                 .max_distortion = 2.05f,
+                                 .max_distortion = 1.95f,
                                  .fade = 5,
                                  .adapt = 1,
                                  .sharpness = 1.5f,

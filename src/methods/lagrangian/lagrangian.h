@@ -112,8 +112,9 @@ void rf_lagrangian_grids_measure_new(RfLagrangian *l, const StepFlow *flow, int 
 RfResult rf_lagrangian_grids_retire(RfLagrangian *l, const StepFlow *flow);
 void rf_lagrangian_grids_drop(RfLagrangian *l);
 float rf_lagrangian_grid_fade(const Grid *grid, double time);
-/// Frames that a fade takes where the flow strains at this rate.
-float rf_lagrangian_fade_length(const RfLagrangian *l, float strain);
+/// Frames that a fade takes where the flow strains at this rate. The fainter the others that a grid takes over from (0
+/// to 1), the sooner they will be gone, and the shorter.
+float rf_lagrangian_fade_length(const RfLagrangian *l, float strain, float others);
 
 /// refill.c
 int rf_lagrangian_coarsest_halvings(const RfLagrangian *l);

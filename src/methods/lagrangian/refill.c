@@ -40,8 +40,9 @@ enum
     AREA_STREAM = 1 << 30
 };
 
-// Weights of others under this (to the power of the sharpness) count as none: the new grid is needed at once.
-#define UNCOVERED 0.02f
+// Weights of others under this count as none. A new grid has it at least to start from, so that it shows at once where
+// it is alone, and where it is not comes in beside the faintest.
+#define UNCOVERED 1e-3f
 // Resemblances under this are not worth a place.
 #define LEAST_RESEMBLANCE 0.03f
 
@@ -77,10 +78,11 @@ static RfResult patch_create(const RfLagrangian *l, RfVec2 centre, int halvings,
     const Material *m = &l->material;
     out->job = (RfDrawJob){.texture = &m->texture,
                            .sharpness = l->options.sharpness,
-                           .origin = {centre.x - 0.5f * (float)side * spacing, centre.y - 0.5f * (float)side * spacing},
-                           .spacing = spacing,
-                           .width = side,
-                           .height = side,
+                           .area = {{centre.x - 0.5f * (float)side * spacing, centre.y - 0.5f * (float)side * spacing},
+                                    spacing,
+                                    spacing,
+                                    side,
+                                    side},
                            .level_bias = halvings + 1};
     memcpy(out->job.turned, m->turned, sizeof m->turned);
     return rf_tile_create(m->texture.quads, side, arena, &out->sums);
@@ -106,11 +108,11 @@ static void draw_overlaps(const Birth *birth, Patch *patch)
     }
 }
 
-// The others' summed weight at the centre, as a weight of the linear kernel.
-static float weight_at_centre(const Birth *birth, const Patch *patch)
+// The others' summed weight at the centre.
+static float weight_at_centre(const Patch *patch)
 {
-    int middle = patch->job.width / 2;
-    return powf(patch->sums.weight[middle * RF_TILE_COLUMNS + middle], 1 / birth->l->options.sharpness);
+    int middle = patch->job.area.width / 2;
+    return patch->sums.weight[middle * RF_TILE_COLUMNS + middle];
 }
 
 static float resemblance_of(const RfLagrangian *l, int a, int b)
@@ -145,13 +147,13 @@ static float mean_resemblance(const Birth *birth)
 static RfResult window_create(const Birth *birth, const Patch *patch, int halvings, RfArena *arena, RfMatchWindow *out)
 {
     const Material *m = &birth->l->material;
-    int side = patch->job.width, quads = m->texture.quads;
+    int side = patch->job.area.width, quads = m->texture.quads;
     size_t numbers = (size_t)(side * side * quads) * 4;
     float *target = rf_arena_push(arena, numbers, sizeof(float)),
           *weight = rf_arena_push(arena, numbers, sizeof(float));
     if (!target || !weight)
         return RF_OUT_OF_MEMORY;
-    float reach = KERNEL_RADIUS * birth->l->radius, spacing = patch->job.spacing;
+    float reach = KERNEL_RADIUS * birth->l->radius, spacing = patch->job.area.spacing;
     size_t k = 0;
     double energy = 0, mean_energy = 0;
     float rho = mean_resemblance(birth);
@@ -195,16 +197,16 @@ static float texel_of(float offset, float scale, float origin, float spacing)
 static RfVec2 match_offset(const RfMatchWindow *window, const Patch *patch, const RfMatch *match)
 {
     const RfTextureLevel *level = &window->texture->levels[window->level];
-    return (RfVec2){offset_of((float)match->x, level->scale_x, patch->job.origin.x, patch->job.spacing),
-                    offset_of((float)match->y, level->scale_y, patch->job.origin.y, patch->job.spacing)};
+    return (RfVec2){offset_of((float)match->x, level->scale_x, patch->job.area.origin.x, patch->job.area.spacing),
+                    offset_of((float)match->y, level->scale_y, patch->job.area.origin.y, patch->job.area.spacing)};
 }
 
 // The best of the 3 x 3 places round an offset.
 static RfMatch refine(const RfMatchWindow *window, const Patch *patch, RfVec2 offset)
 {
     const RfTextureLevel *level = &window->texture->levels[window->level];
-    int x0 = (int)lrintf(texel_of(offset.x, level->scale_x, patch->job.origin.x, patch->job.spacing));
-    int y0 = (int)lrintf(texel_of(offset.y, level->scale_y, patch->job.origin.y, patch->job.spacing));
+    int x0 = (int)lrintf(texel_of(offset.x, level->scale_x, patch->job.area.origin.x, patch->job.area.spacing));
+    int y0 = (int)lrintf(texel_of(offset.y, level->scale_y, patch->job.area.origin.y, patch->job.area.spacing));
     int places[2];
     rf_match_places(window, places);
     RfMatch best = {0, 0, INFINITY};
@@ -298,7 +300,7 @@ static RfResult choose_area(Birth *birth, const Patch *coarse, int halvings, RfA
 static float correlation(const Material *m, const Patch *mine, const Patch *other)
 {
     double cross = 0, own = 0, others = 0;
-    int side = mine->job.width;
+    int side = mine->job.area.width;
     for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x)
         {
@@ -355,7 +357,7 @@ static RfResult measure_resemblances(Birth *birth, int halvings, RfArena *arena)
         RfDrawGrid old = rf_lagrangian_draw_grid_of(l, birth->overlaps[i], l->time);
         if (!(old.fade > 0))
             continue;
-        rf_tile_clear(&other.sums, l->material.texture.quads, other.job.height);
+        rf_tile_clear(&other.sums, l->material.texture.quads, other.job.area.height);
         rf_tile_draw(&other.job, &old, &other.sums, NULL, &pixels);
         float rho = correlation(&l->material, &mine, &other);
         if (fabsf(rho) > LEAST_RESEMBLANCE)
@@ -405,12 +407,12 @@ static RfResult dress(Birth *birth, const StepFlow *flow, RfArena *arena)
     float half = 0.5f * GRID_SIDE * l->radius;
     grid->u0 = birth->centre.x - half + offset.x;
     grid->v0 = birth->centre.y - half + offset.y;
-    float others = weight_at_centre(birth, &patch);
     grid->others = 1;
-    if (l->started && others >= UNCOVERED)
+    if (l->started)
     {
-        grid->others = rf_min(powf(others, l->options.sharpness), 1);
-        grid->fade_in = rf_lagrangian_fade_length(l, grid->strain);
+        float others = weight_at_centre(&patch);
+        grid->others = rf_clamp(others, UNCOVERED, 1);
+        grid->fade_in = rf_lagrangian_fade_length(l, grid->strain, others > UNCOVERED ? grid->others : 0);
         grid->birth = flow->from;
     }
     if (l->options.candidates > 1 && l->options.blend != RF_BLEND_PLAIN)

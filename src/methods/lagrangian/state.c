@@ -11,7 +11,7 @@
 
 enum
 {
-    VERSION = 1
+    VERSION = 2
 };
 
 static const char magic[8] = "RFLAGRAN";
