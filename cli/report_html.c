@@ -135,8 +135,10 @@ static RfResult write_worst(const Report *report, const WorstShot *worst, FILE *
     if (result != RF_OK)
         return result;
     snprintf(title, sizeof title, "Frame %d", worst->shot.number);
-    snprintf(text, sizeof text, ", the worst in %s: %.3g %s (floor %.3g).", worst->quantity, worst->value, worst->unit,
-             worst->floor_value);
+    char floor[40] = "";
+    if (isfinite(worst->floor_value))
+        snprintf(floor, sizeof floor, " (floor %.3g)", worst->floor_value);
+    snprintf(text, sizeof text, ", the worst in %s: %.3g %s%s.", worst->quantity, worst->value, worst->unit, floor);
     if (report->count > 1)
         result = write_figure(stream, worst->shot.image, title, text);
     fputs("<figure>", stream);
