@@ -2,52 +2,19 @@
 #include "flow_input.h"
 #include "errors.h"
 #include "inputs.h"
+#include "mask_input.h"
 #include "progress.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/// Mean over the mask's pixels that cell (i of n) covers, colours together, alpha left out.
-static float mean_of_cell(const RfImageView *image, int colours, int i, int width, int j, int height)
-{
-    int x0 = (int)((int64_t)i * image->width / width), x1 = (int)((int64_t)(i + 1) * image->width / width);
-    int y0 = (int)((int64_t)j * image->height / height), y1 = (int)((int64_t)(j + 1) * image->height / height);
-    x1 = x1 > x0 ? x1 : x0 + 1;
-    y1 = y1 > y0 ? y1 : y0 + 1;
-    double sum = 0;
-    for (int y = y0; y < y1; ++y)
-        for (int x = x0; x < x1; ++x)
-            for (int c = 0; c < colours; ++c)
-                sum += (double)image->pixels[y * image->row_stride + (ptrdiff_t)x * image->channels + c];
-    return (float)(sum / ((double)(x1 - x0) * (y1 - y0) * colours));
-}
-
 static int read_mask(FlowInput *input, const char *path)
 {
-    RfImage *image = NULL;
-    RfResult result = rf_image_read(path, &image);
-    if (result != RF_OK)
-        return fail_result(result, path);
-    RfImageView view = rf_image_view(image);
-    int colours = view.channels - (rf_image_has_alpha(image) ? 1 : 0);
     int width = input->info.width, height = input->info.height;
-    size_t size = (size_t)width * (size_t)height;
-    input->mask = malloc(size);
-    bool any = false;
-    for (int j = 0; j < height && input->mask; ++j)
-        for (int i = 0; i < width; ++i)
-        {
-            // Written so that NaN is land.
-            bool fluid = mean_of_cell(&view, colours, i, width, j, height) >= 0.5f;
-            input->mask[(size_t)j * (size_t)width + (size_t)i] = fluid;
-            any = any || fluid;
-        }
-    rf_image_destroy(image);
-    if (!input->mask)
-        return fail(CODE_FAILED, path, NULL, "out of memory");
-    input->mask_hash = hash_add(1, input->mask, size);
-    return any ? CODE_DONE
-               : fail(CODE_BAD_INPUT, path, NULL, "the mask is black everywhere, so there is no fluid; white is fluid");
+    int code = mask_read(path, width, height, &input->mask);
+    if (!code)
+        input->mask_hash = hash_add(1, input->mask, (size_t)width * (size_t)height);
+    return code;
 }
 
 /// Where the files' numbers are not the frames', someone may have meant them to be.
@@ -99,8 +66,9 @@ void flow_input_warn_of_size(const FlowInput *input, const Settings *settings, i
     if (rounding || (stretch < 1.02 && stretch > 1 / 1.02))
         return;
     warn(settings, input->path,
-         "%d x %d cells in frames of %d x %d pixels: all is stretched %.3g times along %s; --size %.0fx%d would not",
+         "%d x %d cells in frames of %d x %d pixels: all is stretched %.3g times along %s; %s%.0fx%d would not",
          info->width, info->height, width, height, stretch > 1 ? stretch : 1 / stretch, stretch > 1 ? "x" : "y",
+         settings->verb->bit == VERB_MEASURE ? "frames of " : "--size ",
          fmax(1, round((double)height * info->width / info->height)), height);
 }
 

@@ -94,6 +94,17 @@ static void print_method_option(const RfOption *option)
     print_entry(name, text);
 }
 
+/// Those of the table that the list of generic options, as far as the verb has them, has not told yet.
+static void print_table(const RfOption *table, int count, unsigned verb)
+{
+    for (int i = 0; i < count; ++i)
+    {
+        const GenericOption *told = generic_option(table[i].name, 0);
+        if (!told || !(told->verbs & verb))
+            print_method_option(&table[i]);
+    }
+}
+
 static void print_method(const Method *method)
 {
     int count = 0;
@@ -105,9 +116,7 @@ static void print_method(const Method *method)
         snprintf(name, sizeof name, "    --preset %s", method->presets);
         print_entry(name, "where the options below start from; paper: the constants of the publication");
     }
-    for (int i = 0; i < count; ++i)
-        if (!generic_option(table[i].name, 0))
-            print_method_option(&table[i]);
+    print_table(table, count, VERB_TEXTURE);
 }
 
 void print_verb_help(const Verb *verb)
@@ -121,6 +130,12 @@ void print_verb_help(const Verb *verb)
     for (int i = 0; i < count; ++i)
         if (options[i].verbs & verb->bit)
             print_generic(&options[i]);
+    if (verb->table)
+    {
+        const RfOption *table = verb->table(&count);
+        printf("\nHow it measures (default; range):\n");
+        print_table(table, count, verb->bit);
+    }
     if (verb->bit != VERB_TEXTURE)
         return;
     const Method *methods = method_table(&count);

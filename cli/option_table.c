@@ -258,6 +258,28 @@ static int set_full_speed(Settings *settings, const char *value)
     return set_double("full-speed", value, 0, 1e6, &settings->full_speed);
 }
 
+static int set_flow(Settings *settings, const char *value)
+{
+    settings->flow = value;
+    return CODE_DONE;
+}
+
+static int set_exemplar(Settings *settings, const char *value)
+{
+    settings->exemplar = value;
+    return CODE_DONE;
+}
+
+static int set_report(Settings *settings, const char *value)
+{
+    if (!text_extension_in(value, "json|html"))
+        return fail(CODE_USAGE, NULL, NULL, "--report %s: a report is written as .json or .html", value);
+    if (settings->report_count == MAX_REPORTS)
+        return fail(CODE_USAGE, NULL, NULL, "--report %s: more than %d reports", value, MAX_REPORTS);
+    settings->reports[settings->report_count++] = value;
+    return CODE_DONE;
+}
+
 static int set_progress(Settings *settings, const char *value)
 {
     int choice = 0;
@@ -290,7 +312,13 @@ FLAG_SETTER(help)
 
 static const GenericOption g_options[] = {
     {"output", 'o', "OUTPUT", VERBS_WITH_FRAMES, "", "one more output of the same run", set_output},
-    {"frames", 0, "A-B[xS]", VERBS_WITH_FRAMES, "all; 100 of a steady or endless flow",
+    {"flow", 0, "FLOW", VERB_MEASURE, "",
+     "what the frames should follow, built-in ones too; frame numbers are its moments' (first + n K of --moment-every)",
+     set_flow},
+    {"exemplar", 0, "IMAGE", VERB_MEASURE, "", "what the frames should look like", set_exemplar},
+    {"report", 0, "FILE", VERB_MEASURE, "",
+     "all numbers as .json, or a page with plots and pictures as .html; may be given several times", set_report},
+    {"frames", 0, "A-B[xS]", VERBS_WITH_PROGRESS, "all; 100 of a steady or endless flow",
      "which frames, counted from the first file's number (a flow: moment n is frame first + n K of --moment-every); A "
      "starts afresh, xS writes every S-th",
      set_frames},
@@ -301,7 +329,8 @@ static const GenericOption g_options[] = {
     {"moment-every", 0, "K", VERBS_ALL, "1", "frames from one moment of the flow to the next, 1 to 1000000",
      set_moment_every},
     {"variables", 0, "U,V", VERBS_ALL, "found by name", "names of the components in NetCDF, VTK, EXR", set_variables},
-    {"mask", 0, "IMAGE", VERB_TEXTURE, "the flow's own", "white is fluid; stands in for the flow's own mask", set_mask},
+    {"mask", 0, "IMAGE", VERB_TEXTURE | VERB_MEASURE, "the flow's own",
+     "white is fluid; stands in for the flow's own mask", set_mask},
     {"method", 0, "NAME", VERB_TEXTURE, "lagrangian", "how to texture; each is described below", set_method},
     {"preset", 0, "NAME", VERB_TEXTURE, "default", "where the method's options start from", set_preset},
     {"map", 0, "NAME=IMAGE", VERB_TEXTURE | VERB_RENDER, "",
@@ -323,12 +352,13 @@ static const GenericOption g_options[] = {
     {"seed", 0, "N", VERB_TEXTURE | VERB_RENDER, "1", "same seed and inputs: same bytes", set_seed},
     {"threads", 0, "N", VERBS_ALL, "all", "1 to 256; results do not depend on it", set_threads},
     {"resume", 0, NULL, VERBS_WITH_FRAMES, "", "continue a stopped run; a finished one stays as it is", set_resume},
-    {"replace", 'y', NULL, VERBS_WITH_FRAMES, "refuse", "replace outputs that are there", set_replace},
-    {"progress", 0, "auto|bar|plain|json|none", VERBS_WITH_FRAMES, "auto", "how progress is told on stderr",
+    {"replace", 'y', NULL, VERBS_WITH_PROGRESS, "refuse", "replace outputs that are there", set_replace},
+    {"progress", 0, "auto|bar|plain|json|none", VERBS_WITH_PROGRESS, "auto", "how progress is told on stderr",
      set_progress},
-    {"quiet", 'q', NULL, VERBS_WITH_FRAMES, "", "no progress, no warnings", set_quiet},
-    {"verbose", 'v', NULL, VERBS_WITH_FRAMES, "", "tell about inputs, and every frame with its stages", set_verbose},
-    {"json", 0, NULL, VERBS_ALL, "", "one JSON object a line on stderr (info: on stdout)", set_json},
+    {"quiet", 'q', NULL, VERBS_WITH_PROGRESS, "", "no progress, no warnings", set_quiet},
+    {"verbose", 'v', NULL, VERBS_WITH_PROGRESS, "", "tell about inputs, and every frame with its stages", set_verbose},
+    {"json", 0, NULL, VERBS_ALL, "", "one JSON object a line on stderr (info, and the numbers of measure: on stdout)",
+     set_json},
     {"help", 'h', NULL, VERBS_ALL, "", "this text", set_help},
 };
 

@@ -48,11 +48,22 @@ static int refuse_value(const char *name, const char *equals)
     return equals ? fail(CODE_USAGE, NULL, NULL, "--%s takes no value", name) : CODE_DONE;
 }
 
+static const RfOption *verb_option(const Verb *verb, const char *name)
+{
+    int count = 0;
+    const RfOption *table = verb->table(&count);
+    for (int i = 0; i < count; ++i)
+        if (strcmp(table[i].name, name) == 0)
+            return &table[i];
+    return NULL;
+}
+
 static int parse_method_option(Parser *parser, const char *word, const char *name, const char *equals)
 {
-    const RfOption *option = NULL;
-    if (parser->settings->verb->bit != VERB_TEXTURE || !method_with_option(name, &option))
-        return unknown_option(parser->settings->verb, word);
+    const Verb *verb = parser->settings->verb;
+    const RfOption *option = verb->table ? verb_option(verb, name) : NULL;
+    if (!option && (verb->bit != VERB_TEXTURE || !method_with_option(name, &option)))
+        return unknown_option(verb, word);
     const char *value = equals ? equals + 1 : "yes";
     if (option->kind != RF_OPTION_BOOL)
     {
@@ -218,9 +229,9 @@ static int set_number(void *field, const RfOption *option, const char *text)
     return CODE_DONE;
 }
 
-static int set_field(MethodOptions *options, const RfOption *option, const char *text)
+static int set_field(void *options, const RfOption *option, const char *text)
 {
-    void *field = options->bytes + option->offset;
+    void *field = (unsigned char *)options + option->offset;
     switch (option->kind)
     {
     case RF_OPTION_CHOICE:
@@ -266,6 +277,14 @@ int settings_method_options(const Settings *settings, MethodOptions *options)
             return code;
     }
     return CODE_DONE;
+}
+
+int settings_verb_options(const Settings *settings, void *options)
+{
+    int code = CODE_DONE;
+    for (int i = 0; i < settings->method_option_count && !code; ++i)
+        code = set_field(options, settings->method_options[i].option, settings->method_options[i].text);
+    return code;
 }
 
 bool settings_json(const Settings *settings)

@@ -8,6 +8,7 @@
 enum
 {
     MAX_OUTPUTS = 16,
+    MAX_REPORTS = 4,
     MAX_METHOD_OPTIONS = 64,
     MAX_WORDS = 4096,
     NAME_SIZE = 32
@@ -20,8 +21,10 @@ enum
     VERB_RENDER = 2,
     VERB_CONVERT = 4,
     VERB_INFO = 8,
+    VERB_MEASURE = 16,
     VERBS_WITH_FRAMES = VERB_TEXTURE | VERB_RENDER | VERB_CONVERT,
-    VERBS_ALL = VERBS_WITH_FRAMES | VERB_INFO
+    VERBS_WITH_PROGRESS = VERBS_WITH_FRAMES | VERB_MEASURE,
+    VERBS_ALL = VERBS_WITH_PROGRESS | VERB_INFO
 };
 
 typedef enum ProgressKind
@@ -69,6 +72,8 @@ typedef struct Verb
     const char *sentence;
     /// Further lines of its help; may be NULL.
     const char *notes;
+    /// Options of its own; NULL where it has none (the methods of `texture` have theirs).
+    const RfOption *(*table)(int *count);
     int (*run)(struct Settings *settings);
 } Verb;
 
@@ -114,12 +119,19 @@ typedef struct Settings
 
     Picture picture;
     double displace, full_speed;
+
+    /// Of `measure`; NULL: not given.
+    const char *flow, *exemplar;
+    const char *reports[MAX_REPORTS];
+    int report_count;
 } Settings;
 
 /// Fills the settings from the words after the verb.
 int settings_parse(Settings *settings, const Verb *verb, int count, char **words);
 /// The method's options: its preset, then --seed and --fps, then its own.
 int settings_method_options(const Settings *settings, MethodOptions *options);
+/// The same for the verb's own table, over the defaults that stand in `options`.
+int settings_verb_options(const Settings *settings, void *options);
 bool settings_json(const Settings *settings);
 /// What to look for before anything is parsed, so that a wrong command line is told in the right form too.
 bool wants_json(int count, char **words);

@@ -6,5 +6,6 @@
 
 int run_texture(Settings *settings);
 int run_render(Settings *settings);
+int run_measure(Settings *settings);
 int run_convert(Settings *settings);
 int run_info(Settings *settings);

@@ -102,6 +102,12 @@ static void make_images(void)
     put_image("tiny.png", 4, 4, 3, 0.2f);
     put_image("nan.exr", 32, 32, 3, NAN);
     put_image("small.png", 16, 16, 1, 0.2f);
+    put_image("size.1.png", 32, 32, 3, 0.2f);
+    put_image("size.2.png", 16, 16, 3, 0.2f);
+    put_image("kind.1.png", 16, 16, 3, 0.2f);
+    put_image("kind.2.png", 16, 16, 1, 0.2f);
+    put_image("gap.1.png", 32, 32, 3, 0.2f);
+    put_image("gap.3.png", 32, 32, 3, 0.2f);
     put_named_exr("height.exr", "height", "rough");
     put("empty.png", "", 0);
     put_part("cut12.png", "good.png", 12);
@@ -379,7 +385,7 @@ static void wrong_command_lines_are_refused_with_the_right_one(void **state)
     (void)state;
     static const Case cases[] = {
         {"", 2, "no verb; riffle --help"},
-        {"measure a b", 2, "unknown verb measure; there are: texture, render, convert, info"},
+        {"judge a b", 2, "unknown verb judge; there are: texture, render, measure, convert, info"},
         {"texture", 2, "texture needs FLOW EXEMPLAR OUTPUT: 0 of 3 are given"},
         {FLOW "good.png", 2, "2 of 3 are given"},
         {FLOW "good.png outputs/a.png outputs/b.png", 2, "but \"outputs/b.png\" is left"},
@@ -427,6 +433,49 @@ static void wrong_command_lines_are_refused_with_the_right_one(void **state)
     CHECK(cases);
 }
 
+static void frames_that_cannot_be_judged_are_refused_with_the_reason(void **state)
+{
+    (void)state;
+    static const Case cases[] = {
+        {"measure", 2, "measure needs FRAMES: 0 of 1 are given"},
+        {"measure good.png small.png", 2, "but \"small.png\" is left"},
+        {"measure missing.png", 3, "missing.png: "},
+        {"measure missing.%04d.png", 3, "missing.%04d.png: "},
+        {"measure cut.png", 3, "cut.png:row 0: broken PNG"},
+        {"measure good.flo", 3, "good.flo: not a readable image"},
+        {"measure height.exr", 3, "height.exr: no colour here: looked for R G B or Y; its first channel is "},
+        {"measure nan.exr", 3, "nan.exr:pixel (8, 16), channel R: is NaN"},
+        {"measure tiny.png", 3, "tiny.png: 4 x 4 pixels: frames need 16 on each side to be measured"},
+        {"measure size.%d.png", 3, "size.2.png: is 16 x 16 pixels, the first frame 32 x 32: all need one size"},
+        {"measure kind.%d.png", 3, "kind.2.png: has 1 channel of colour and alpha, the first frame 3"},
+        {"measure size.1.png --frames 2-3", 2, "--frames 2-3: size.1.png has the frames 1 to 1"},
+        {"measure good.png --exemplar missing.png", 3, "missing.png: "},
+        {"measure good.png --exemplar tiny.png", 3,
+         "tiny.png: 4 x 4 pixels: an exemplar needs 16 on each side to be measured with"},
+        {"measure good.png --exemplar nan.exr", 3, "nan.exr:pixel (8, 16), channel R: is NaN"},
+        {"measure good.png --exemplar height.exr", 3, "height.exr: no colour here"},
+        {"measure good.png --flow cut.flo", 3, "cut.flo:data: "},
+        {"measure good.png --flow builtin:gale", 3, "builtin:gale: there is no built-in flow of that name"},
+        {"measure gap.%d.png --flow builtin:gyre?size=32x32", 3,
+         "gap.%d.png: has no frame 2, between 1 and 3: motion is judged from each frame to the next"},
+        {"measure gap.%d.png --flow builtin:gyre?size=32x32 --frames 1-3x2", 2,
+         "--frames 1-3x2: motion is judged from each frame to the next; leave x2 out"},
+        {"measure good.png --mask black.pgm", 3, "black.pgm: the mask is black everywhere"},
+        {"measure good.png --report outputs/a.txt", 2, "a report is written as .json or .html"},
+        {"measure good.png --report nowhere/a.json", 1, "nowhere/a.json: cannot be written: No such file"},
+        {"measure good.png --flow ranges.png --report ranges.json -y", 2,
+         "ranges.json: is an input of this run and is never replaced"},
+        {"measure good.png --rotations 0", 2, "--rotations 0: must be a whole number, 1 to 72"},
+        {"measure good.png --holes none", 2, "--holes none: must be auto, alpha, zero or nan"},
+        {"measure good.png --spectrum-crop 17", 2, "--spectrum-crop 17: must be 0, or even and 16 to 512"},
+        {"measure good.png --spectrum-crop 64", 2, "--spectrum-crop 64: good.png is 32 x 32 pixels"},
+        {"measure good.png --exemplar small.png --patch-size 31", 2, "--patch-size 31: small.png is 16 x 16 pixels"},
+        {"measure good.png --fade 3", 2, "measure has no option --fade"},
+        {"measure good.png --resume", 2, "measure has no option --resume"},
+    };
+    CHECK(cases);
+}
+
 static void outputs_that_cannot_be_are_refused_before_anything_is_made(void **state)
 {
     (void)state;
@@ -466,6 +515,8 @@ static void a_full_disk_fails_the_run_and_leaves_no_half_file(void **state)
         {"convert builtin:vortex outputs/a.npy -q", 1, "outputs/a.npy: cannot be written: "},
         {"convert builtin:vortex outputs/a.exr -q", 1, "outputs/a.exr: cannot be written: "},
         {"render builtin:vortex outputs/a.png --as lic --frames 1 -q", 1, "outputs/a.png: cannot be written: "},
+        {"measure builtin:noise --report outputs/a.html -q", 1, "outputs/a.html: cannot be written: "},
+        {"measure builtin:noise --report outputs/a.json -q", 1, "outputs/a.json: cannot be written: "},
     };
     // The largest file that the program may write.
     check(cases, sizeof cases / sizeof cases[0], 4096);
@@ -478,6 +529,7 @@ int main(void)
         cmocka_unit_test(unusable_exemplars_are_refused_with_what_to_do),
         cmocka_unit_test(broken_flows_are_told_by_name_and_place),
         cmocka_unit_test(wrong_command_lines_are_refused_with_the_right_one),
+        cmocka_unit_test(frames_that_cannot_be_judged_are_refused_with_the_reason),
         cmocka_unit_test(outputs_that_cannot_be_are_refused_before_anything_is_made),
         cmocka_unit_test(a_full_disk_fails_the_run_and_leaves_no_half_file),
     };

@@ -117,6 +117,28 @@ static void png_keeps_every_sample_of_8_and_16_bit_for_1_to_4_channels(void **st
     }
 }
 
+static void png_in_memory_is_the_same_picture_and_refuses_what_png_cannot_hold(void **state)
+{
+    (void)state;
+    // Larger than any buffer of the encoder's, and noise, so that the block grows.
+    RfImage *image = make_image(300, 200, 3, RF_SAMPLE_U8, RF_ENCODING_SRGB);
+    RfImage *wide = make_image(8, 8, 5, RF_SAMPLE_U8, RF_ENCODING_DATA);
+    fill(image);
+    void *block = NULL;
+    size_t size = 0;
+    assert_int_equal(rf_image_encode_png(image, &block, &size), RF_OK);
+    const char *path = test_folder_file(&g_folder, "memory.png");
+    assert_true(test_file_write(path, block, size));
+    RfImage *again = read_image(path);
+    assert_same_pixels(image, again);
+    rf_free(block);
+    assert_int_equal(rf_image_encode_png(wide, &block, &size), RF_UNSUPPORTED);
+    assert_null(block);
+    rf_image_destroy(again);
+    rf_image_destroy(image);
+    rf_image_destroy(wide);
+}
+
 static void exr_keeps_every_half_and_float_and_every_channel_name(void **state)
 {
     (void)state;
@@ -528,6 +550,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(png_keeps_every_sample_of_8_and_16_bit_for_1_to_4_channels),
+        cmocka_unit_test(png_in_memory_is_the_same_picture_and_refuses_what_png_cannot_hold),
         cmocka_unit_test(exr_keeps_every_half_and_float_and_every_channel_name),
         cmocka_unit_test(exr_channels_come_back_in_the_order_colour_alpha_and_the_rest_by_name),
         cmocka_unit_test(exr_makes_encoded_colour_linear_and_leaves_data_alone),

@@ -21,6 +21,9 @@ RF_API RF_MUST_USE RfResult rf_image_read(const char *path, RfImage **out);
 /// affair.
 RF_API RF_MUST_USE RfResult rf_image_write(const char *path, const RfImage *image);
 
+/// The bytes of a PNG, as rf_image_write would put them into a file but smaller and slower; freed with rf_free.
+RF_API RF_MUST_USE RfResult rf_image_encode_png(const RfImage *image, void **block, size_t *size);
+
 // ---- numbered sequences ------------------------------------------------------------------------------------------
 
 /// The files that a pattern (name.%04d.ext, name.####.ext, name.$F4.ext), a directory or a single file stands for, in
