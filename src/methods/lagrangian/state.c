@@ -6,6 +6,7 @@
 
 #include "core/hash.h"
 #include "core/maths.h"
+#include "core/options.h"
 #include "core/result.h"
 #include "core/simd.h"
 
@@ -29,18 +30,11 @@ typedef struct Header
     uint32_t next_id, padding;
 } Header;
 
-// Field by field: the struct's padding has no defined bytes.
 static uint64_t hash_options(const RfLagrangianOptions *options)
 {
     int count;
     const RfOption *table = rf_lagrangian_option_table(&count);
-    uint64_t hash = VERSION;
-    for (int i = 0; i < count; ++i)
-    {
-        size_t size = table[i].kind == RF_OPTION_UINT64 ? 8 : table[i].kind == RF_OPTION_BOOL ? 1 : 4;
-        hash = rf_hash_bytes((const uint8_t *)options + table[i].offset, size, hash);
-    }
-    return hash;
+    return rf_options_hash(options, table, count, VERSION);
 }
 
 static uint64_t hash_content(Header header, const uint8_t *content, size_t size)
