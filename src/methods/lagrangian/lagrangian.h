@@ -77,6 +77,8 @@ struct RfLagrangian
 {
     const RfExemplar *exemplar;
     RfLagrangianOptions options;
+    /// Sprites: grids do not bend; whether they turn with the flow.
+    bool rigid, turning;
     Material material;
     /// Halvings of the exemplar at which new grids are matched first.
     int match_halvings;
@@ -114,6 +116,13 @@ void rf_lagrangian_grids_drop(RfLagrangian *l);
 float rf_lagrangian_grid_fade(const Grid *grid, double time);
 /// Frames that a fade takes where the flow strains at this rate.
 float rf_lagrangian_fade_length(const RfLagrangian *l, float strain);
+
+/// sprites.c: as rf_advect_grid for the vertices of a rigid grid.
+void rf_lagrangian_sprite_advect(const RfLagrangian *l, const StepFlow *flow, RfVec2 centre, float *x, float *y,
+                                 bool *inside);
+
+/// state.c: brings a saved state into a stepper that was just made.
+RfResult rf_lagrangian_restore(RfLagrangian *l, const void *block, size_t size);
 
 /// refill.c
 int rf_lagrangian_coarsest_halvings(const RfLagrangian *l);
