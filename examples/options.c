@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints a table of the library as Markdown, as it stands in docs/:
 //
-//     options lagrangian|warp|flow|exemplar
+//     options lagrangian|eulerian|dual|sprites|warp|flow|exemplar
 //
 // A method's options, or the built-in flows or exemplars. A test holds the docs to it (cmake/doc_tables.sh).
 #include <riffle/riffle.h>
@@ -82,13 +82,19 @@ int main(int argc, char **argv)
     const RfOption *table = NULL;
     if (strcmp(what, "lagrangian") == 0)
         table = rf_lagrangian_option_table(&count);
+    else if (strcmp(what, "eulerian") == 0)
+        table = rf_eulerian_option_table(&count);
+    else if (strcmp(what, "dual") == 0)
+        table = rf_dual_option_table(&count);
+    else if (strcmp(what, "sprites") == 0)
+        table = rf_sprites_option_table(&count);
     else if (strcmp(what, "warp") == 0)
         table = rf_warp_option_table(&count);
     else if (strcmp(what, "flow") == 0 || strcmp(what, "exemplar") == 0)
         return print_builtins(what);
     if (!table)
     {
-        fprintf(stderr, "usage: options lagrangian|warp|flow|exemplar\n");
+        fprintf(stderr, "usage: options lagrangian|eulerian|dual|sprites|warp|flow|exemplar\n");
         return 2;
     }
     print_options(table, count);

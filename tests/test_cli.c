@@ -238,10 +238,10 @@ static void every_verb_makes_what_it_says(void **state)
 static void a_frames_hash_does_not_depend_on_the_number_of_threads(void **state)
 {
     (void)state;
-    static const char *const methods[] = {"lagrangian", "warp"};
+    static const char *const methods[] = {"lagrangian", "eulerian", "dual", "sprites", "warp"};
     static const int threads[] = {1, 2, 3, 8};
     TestFolder folder = test_folder_make();
-    for (int m = 0; m < 2; ++m)
+    for (int m = 0; m < 5; ++m)
     {
         char *first = NULL;
         for (int t = 0; t < 4; ++t)
@@ -636,9 +636,14 @@ static void a_run_resumes_with_the_same_bytes_wherever_it_was_stopped(void **sta
     (void)state;
     static const int signals[] = {SIGKILL, SIGINT, SIGTERM};
     static const int places[] = {0, 1, 2, 5, 11, 17};
-    static const char *const lines[] = {RESUME_LINE, RESUME_LINE " --method warp", RESUME_LINE " --uv --size 64x48"};
+    static const char *const lines[] = {RESUME_LINE,
+                                        RESUME_LINE " --method eulerian --latency 6",
+                                        RESUME_LINE " --method dual --reset-every 7",
+                                        RESUME_LINE " --method sprites",
+                                        RESUME_LINE " --method warp",
+                                        RESUME_LINE " --uv --size 64x48"};
     int stopped = 0;
-    for (int l = 0; l < 3; ++l)
+    for (int l = 0; l < 6; ++l)
     {
         TestFolder whole = test_folder_make();
         expect(&whole, lines[l], 0);
@@ -647,8 +652,8 @@ static void a_run_resumes_with_the_same_bytes_wherever_it_was_stopped(void **sta
         stopped += break_and_resume(&whole, lines[l], SIGKILL, 3);
         test_folder_remove(&whole);
     }
-    // Of 21; a fast machine may finish some before the signal.
-    assert_true(stopped >= 12);
+    // Of 42; a fast machine may finish some before the signal.
+    assert_true(stopped >= 24);
 }
 
 static void a_resumed_video_has_all_frames(void **state)
@@ -697,6 +702,7 @@ static void another_run_is_not_resumed(void **state)
                                          "--size 64x64",
                                          "--fade 2",
                                          "--method warp",
+                                         "--method sprites",
                                          "--velocity-scale 2",
                                          "--fps 25",
                                          "--map rough=builtin:noise?size=64",

@@ -4,7 +4,10 @@
 
 #include "base.h"
 #include "data.h"
+#include "dual.h"
+#include "eulerian.h"
 #include "io.h"
 #include "lagrangian.h"
 #include "render.h"
+#include "sprites.h"
 #include "warp.h"

@@ -13,17 +13,28 @@ enum
     BAND = 8
 };
 
-void rf_crossfade_regenerate(RfCoordinates *c, const RfTurn *turns, double before)
+RfResult rf_crossfade_move(RfCoordinates *c, const RfTurn *turns, const char *stage, const RfFlowView *flow, int width,
+                           int height)
 {
-    for (int set = 0; set < c->sets; ++set)
+    double before = c->time;
+    bool first = !c->placed;
+    RF_TRY(rf_coordinates_move(c, stage, flow, width, height));
+    for (int set = 0; set < c->sets && !first; ++set)
         if (rf_turn_count(turns[set], c->time - c->start) != rf_turn_count(turns[set], before - c->start))
             rf_coordinates_reset(c, set);
+    return RF_OK;
 }
 
-RfVec2 rf_crossfade_origin(const RfExemplar *exemplar, uint64_t seed, uint64_t count, uint64_t set)
+void rf_crossfade_origins(RfCrossfade *crossfade, uint64_t seed, const RfTurn *turns)
 {
-    return (RfVec2){(float)exemplar->width * rf_random_float(seed, count, set, 0),
-                    (float)exemplar->height * rf_random_float(seed, count, set, 1)};
+    const RfCoordinates *c = crossfade->coordinates;
+    const RfExemplar *exemplar = crossfade->sampler->exemplar;
+    for (int set = 0; set < c->sets; ++set)
+    {
+        uint64_t frame = turns ? rf_turn_count(turns[set], c->time - c->start) : 0, item = turns ? (uint64_t)set : 0;
+        crossfade->origins[set] = (RfVec2){(float)exemplar->width * rf_random_float(seed, frame, item, 0),
+                                           (float)exemplar->height * rf_random_float(seed, frame, item, 1)};
+    }
 }
 
 static void fit_channel(const RfExemplar *exemplar, int channel, float *mean, float *low, float *high)

@@ -32,8 +32,9 @@ static inline uint64_t rf_turn_count(RfTurn turn, double elapsed)
     return (uint64_t)((elapsed + turn.phase) / turn.period);
 }
 
-/// Starts those sets afresh whose turn came after time `before`. turns: one a set.
-void rf_crossfade_regenerate(RfCoordinates *coordinates, const RfTurn *turns, double before);
+/// rf_coordinates_move, then starts those sets afresh whose turn came. turns: one a set.
+RfResult rf_crossfade_move(RfCoordinates *coordinates, const RfTurn *turns, const char *stage, const RfFlowView *flow,
+                           int width, int height);
 
 /// Weights >= 0 of all sets at `count` pixels from (x, y) on: weights[set][RF_CROSSFADE_PIXELS].
 typedef void RfWeighPixels(const void *context, int x, int y, int count, float (*weights)[RF_CROSSFADE_PIXELS]);
@@ -46,13 +47,12 @@ typedef struct RfCrossfade
     RfVec2 origins[RF_MAX_COORDINATE_SETS];
     RfWeighPixels *weigh;
     const void *context;
-    RfResolveQuad quads[RF_SAMPLE_QUADS];
-    /// Of the quads: contrast is put back.
-    bool contrast;
+    /// From rf_crossfade_quads; NULL for a single set.
+    const RfResolveQuad *quads;
 } RfCrossfade;
 
-/// A place in the exemplar drawn from the seed.
-RfVec2 rf_crossfade_origin(const RfExemplar *exemplar, uint64_t seed, uint64_t count, uint64_t set);
+/// Draws the sets' origins from the seed: another one at each turn, or with turns NULL one for all, for ever.
+void rf_crossfade_origins(RfCrossfade *crossfade, uint64_t seed, const RfTurn *turns);
 
 /// What the exemplar's channels are blended about and kept within. Directions and alpha are blended plainly.
 void rf_crossfade_quads(const RfExemplar *exemplar, bool contrast, RfResolveQuad quads[RF_SAMPLE_QUADS]);

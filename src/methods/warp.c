@@ -84,9 +84,8 @@ RfResult rf_warp_step(RfWarp *warp, const RfFlowView *flow, const RfImageView *f
     RF_REQUIRE(warp && frame && frame->pixels, "rf_warp_step: warp or frame is NULL");
     RF_TRY(rf_crossfade_check(&warp->sampler, frame));
     RF_TRY(rf_warp_advance(warp, flow, frame->width, frame->height));
-    RfCrossfade single = {.sampler = &warp->sampler,
-                          .coordinates = &warp->coordinates,
-                          .origins = {rf_crossfade_origin(warp->sampler.exemplar, warp->options.seed, 0, 0)}};
+    RfCrossfade single = {.sampler = &warp->sampler, .coordinates = &warp->coordinates};
+    rf_crossfade_origins(&single, warp->options.seed, NULL);
     rf_crossfade_draw(&single, flow, frame);
     return RF_OK;
 }
