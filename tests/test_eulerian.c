@@ -58,7 +58,7 @@ static float largest_change_on_the_left(void)
 {
     float largest = 0;
     for (int y = 0; y < N; ++y)
-        for (int k = 0; k < 3 * (N / 2 - 4); ++k)
+        for (int k = 0; k < 3 * (N / 2 - 24); ++k)
             largest = rf_max(fabsf(g_last[3 * N * y + k] - g_before[3 * N * y + k]), largest);
     return largest;
 }

@@ -7,20 +7,23 @@
 //     w_p = sin^2(pi age_p / latency).
 //
 // The layers' latencies double. A short one keeps the texture's look and shows motion badly, a long one follows the
-// flow and stretches. Which one a place needs is measured, not assumed: the deformation that a layer's coordinates have
-// accumulated there is
+// flow and stretches. Which one a place needs is measured, not assumed: from the Jacobians J of the coordinates comes
+// the deformation they have accumulated, and from all sets together the rate at which it grows there,
 //
-//     e_l = sum_p w_p ln delta(J_p) / sum_p w_p,    delta = max(s_max, 1 / s_min),
+//     rate = mean over the layers of  sum_p w_p ln delta(J_p) / sum_p w_p age_p,    delta = max(s_max, 1 / s_min),
 //
-// s the singular values of the coordinates' Jacobian. The ideal latency is the one at which e is the limit E = ln
-// max_distortion. Deformation grows about as the age, so layer l + 1, where e_(l + 1) = 2 e_l, is shown in full while
-// e_(l + 1) <= E and not at all from 2 E on, which is where layer l just meets the limit: of what is left over by the
-// shorter ones each layer takes
+// s the singular values. The mean age of what is seen of a layer is half its latency, so the latency at which the mean
+// deformation is the limit is
 //
-//     share_l = clamp(2 - e_l / E, 0, 1).
+//     ideal = 2 ln(max_distortion) / rate,
 //
-// In between the pictures of two latencies are mixed, and the effective latency is between theirs. All of it is
-// continuous in space and time, as the coordinates are.
+// held between the shortest and the longest there is, and the two layers whose latencies enclose it are mixed, linearly
+// in its logarithm.
+//
+// The rate is taken on a lattice of every eighth pixel and smoothed: deformation lies in filaments as thin as the
+// texture's features, and weights that vary as fast draw patterns of their own. Tried and dropped: to compare each
+// layer's own deformation with the limit, pixel by pixel. It pulses with the layer's phases, and the mix with it (half
+// again as much flicker).
 //
 // Deviations: the paper interpolates parameters of procedural noise to keep its contrast; pictures here are blended by
 // the contrast-preserving form. Small-scale animation, its third part, is no matter of following a given flow.
@@ -28,14 +31,19 @@
 
 #include "core/memory.h"
 #include "core/options.h"
+#include "core/parallel.h"
 #include "core/progress.h"
 #include "core/result.h"
 #include "kernels/crossfade.h"
 
+#include <stdlib.h>
+
 enum
 {
     MAX_LAYERS = 3,
-    MAX_PHASES = 3
+    MAX_PHASES = 3,
+    // Pixels from one node of the lattice to the next.
+    LATTICE = 8
 };
 
 static_assert(MAX_LAYERS * MAX_PHASES <= RF_MAX_COORDINATE_SETS, "room for the sets");
@@ -51,6 +59,9 @@ struct RfEulerian
     /// Set p of layer l is number l * phases + p.
     RfTurn turns[MAX_LAYERS * MAX_PHASES];
     RfResolveQuad quads[RF_SAMPLE_QUADS];
+    /// Growth of deformation, 1 / frame, at pixels (LATTICE i, LATTICE j): as measured, and smoothed.
+    int columns, rows;
+    float *measured, *rate;
 };
 
 #define FIELD(name) offsetof(RfEulerianOptions, name)
@@ -133,6 +144,8 @@ void rf_eulerian_destroy(RfEulerian *eulerian)
         return;
     rf_sampler_free(&eulerian->sampler);
     rf_coordinates_free(&eulerian->coordinates);
+    rf_release(eulerian->measured);
+    rf_release(eulerian->rate);
     rf_release(eulerian);
 }
 
@@ -156,8 +169,8 @@ static float log_distortion(RfJacobian j)
 typedef struct Weighing
 {
     const RfEulerian *eulerian;
-    /// Of the sets, by age.
-    float weights[MAX_LAYERS * MAX_PHASES];
+    /// Of the sets, by age; and their ages in frames.
+    float weights[MAX_LAYERS * MAX_PHASES], ages[MAX_LAYERS * MAX_PHASES];
 } Weighing;
 
 static Weighing weighing_of(const RfEulerian *eulerian)
@@ -166,46 +179,106 @@ static Weighing weighing_of(const RfEulerian *eulerian)
     const RfCoordinates *c = &eulerian->coordinates;
     for (int set = 0; set < c->sets; ++set)
     {
-        RfTurn turn = eulerian->turns[set];
-        double wave = sin((double)RF_PI * rf_turn_age(turn, c->time - c->start) / turn.period);
+        // Before its first turn a set is less deformed than its phase says, so the first frames show long latencies and
+        // turn to shorter ones gradually.
+        double age = rf_turn_age(eulerian->turns[set], c->time - c->start);
+        double wave = sin((double)RF_PI * age / eulerian->turns[set].period);
         weighing.weights[set] = (float)(wave * wave);
+        weighing.ages[set] = (float)age;
     }
     return weighing;
 }
 
-// e_l at a pixel.
-static float layer_deformation(const Weighing *weighing, int layer, int x, int y)
+static float rate_at(const Weighing *weighing, int x, int y)
 {
-    int phases = weighing->eulerian->options.phases;
-    float sum = 0, total = 0;
-    for (int set = layer * phases; set < (layer + 1) * phases; ++set)
-        if (weighing->weights[set] > 0)
-        {
-            RfJacobian j = rf_coordinates_jacobian(&weighing->eulerian->coordinates, set, x, y);
-            sum += weighing->weights[set] * log_distortion(j);
-            total += weighing->weights[set];
-        }
-    return total > 0 ? sum / total : 0;
+    const RfEulerianOptions *options = &weighing->eulerian->options;
+    float rate = 0;
+    for (int layer = 0; layer < options->layers; ++layer)
+    {
+        float deformation = 0, age = 0;
+        for (int set = layer * options->phases; set < (layer + 1) * options->phases; ++set)
+            if (weighing->weights[set] > 0)
+            {
+                RfJacobian j = rf_coordinates_jacobian(&weighing->eulerian->coordinates, set, x, y);
+                deformation += weighing->weights[set] * log_distortion(j);
+                age += weighing->weights[set] * weighing->ages[set];
+            }
+        rate += age > 0 ? deformation / age : 0;
+    }
+    return rate / (float)options->layers;
+}
+
+static void measure_row(void *context, int row, int worker)
+{
+    (void)worker;
+    const Weighing *weighing = context;
+    const RfEulerian *eulerian = weighing->eulerian;
+    int y = rf_min_int(LATTICE * row, eulerian->coordinates.height - 1);
+    for (int i = 0; i < eulerian->columns; ++i)
+    {
+        int x = rf_min_int(LATTICE * i, eulerian->coordinates.width - 1);
+        eulerian->measured[row * eulerian->columns + i] = rate_at(weighing, x, y);
+    }
+}
+
+// Means of 3 x 3 nodes, weighted 1 2 1 along each axis.
+static void smooth_row(void *context, int row, int worker)
+{
+    (void)worker;
+    const RfEulerian *eulerian = ((const Weighing *)context)->eulerian;
+    for (int i = 0; i < eulerian->columns; ++i)
+    {
+        float sum = 0;
+        for (int dy = -1; dy <= 1; ++dy)
+            for (int dx = -1; dx <= 1; ++dx)
+            {
+                int x = rf_clamp_int(i + dx, 0, eulerian->columns - 1),
+                    y = rf_clamp_int(row + dy, 0, eulerian->rows - 1);
+                sum += (float)((2 - abs(dx)) * (2 - abs(dy))) * eulerian->measured[y * eulerian->columns + x];
+            }
+        eulerian->rate[row * eulerian->columns + i] = sum / 16;
+    }
+}
+
+static RfResult make_lattice(RfEulerian *eulerian, int width, int height)
+{
+    if (eulerian->rate)
+        return RF_OK;
+    eulerian->columns = (width + LATTICE - 1) / LATTICE + 1;
+    eulerian->rows = (height + LATTICE - 1) / LATTICE + 1;
+    size_t nodes = (size_t)eulerian->columns * (size_t)eulerian->rows;
+    if (!eulerian->measured)
+        eulerian->measured = rf_allocate(nodes, sizeof(float));
+    if (eulerian->measured)
+        eulerian->rate = rf_allocate(nodes, sizeof(float));
+    return eulerian->rate ? RF_OK : RF_OUT_OF_MEMORY;
+}
+
+// The smoothed rate at a pixel of the lattice's row of cells `upper`, t of the way down it.
+static float interpolate_rate(const RfEulerian *eulerian, const float *upper, float t, int x)
+{
+    const float *left = upper + x / LATTICE, *lower = left + eulerian->columns;
+    float s = (float)(x % LATTICE) / LATTICE;
+    return rf_lerp(rf_lerp(left[0], left[1], s), rf_lerp(lower[0], lower[1], s), t);
 }
 
 static void weigh(const void *context, int x, int y, int count, float (*weights)[RF_CROSSFADE_PIXELS])
 {
     const Weighing *weighing = context;
-    const RfEulerianOptions *options = &weighing->eulerian->options;
-    float limit = logf(options->max_distortion);
+    const RfEulerian *eulerian = weighing->eulerian;
+    int layers = eulerian->options.layers, phases = eulerian->options.phases;
+    // Of a rate under it, the ideal latency is the longest.
+    float limit = 2 * logf(eulerian->options.max_distortion) / (float)eulerian->options.latency,
+          least = limit / (float)(1 << (layers - 1));
+    const float *upper = eulerian->rate + (size_t)(y / LATTICE) * (size_t)eulerian->columns;
     for (int i = 0; i < count; ++i)
     {
-        float left = 1;
-        for (int layer = 0; layer < options->layers; ++layer)
-        {
-            // What the next layer takes over from this one.
-            float taken = layer + 1 < options->layers
-                              ? rf_clamp(2 - layer_deformation(weighing, layer + 1, x + i, y) / limit, 0, 1)
-                              : 0;
-            for (int set = layer * options->phases; set < (layer + 1) * options->phases; ++set)
-                weights[set][i] = left * (1 - taken) * weighing->weights[set];
-            left *= taken;
-        }
+        float rate = interpolate_rate(eulerian, upper, (float)(y % LATTICE) / LATTICE, x + i);
+        float place = rate > least ? rf_max(log2f(limit / rate), 0) : (float)(layers - 1);
+        for (int layer = 0; layer < layers; ++layer)
+            for (int phase = 0; phase < phases; ++phase)
+                weights[layer * phases + phase][i] =
+                    rf_max(1 - fabsf(place - (float)layer), 0) * weighing->weights[layer * phases + phase];
     }
 }
 
@@ -214,7 +287,10 @@ RfResult rf_eulerian_step(RfEulerian *eulerian, const RfFlowView *flow, const Rf
     RF_REQUIRE(eulerian && frame && frame->pixels, "rf_eulerian_step: eulerian or frame is NULL");
     RF_TRY(rf_crossfade_check(&eulerian->sampler, frame));
     RF_TRY(rf_eulerian_advance(eulerian, flow, frame->width, frame->height));
+    RF_TRY(make_lattice(eulerian, frame->width, frame->height));
     Weighing weighing = weighing_of(eulerian);
+    rf_parallel_for(eulerian->rows, measure_row, &weighing);
+    rf_parallel_for(eulerian->rows, smooth_row, &weighing);
     RfCrossfade crossfade = {.sampler = &eulerian->sampler,
                              .coordinates = &eulerian->coordinates,
                              .weigh = weigh,
