@@ -131,8 +131,7 @@ static void sets_start_afresh_unseen_whatever_the_latency_and_the_phases(void **
             RfEulerianOptions options = options_of(latency, 1);
             options.phases = phases;
             Look look = look_at(options);
-            // sin^2 rises by pi / latency at most, and all values are 0 to 1; weights add to 1, but for phases that
-            // are not whole frames.
+            // A share rises by about pi / latency at most, and all values are 0 to 1.
             assert_true(look.change < 1.2f * RF_PI / (float)latency);
             assert_true(look.change > 0.05f);
         }

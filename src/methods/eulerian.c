@@ -4,7 +4,10 @@
 // A layer is two or three sets of carried coordinates that start afresh in turn, every `latency` frames. A set's weight
 // is 0 when it starts, so the jump is never seen:
 //
-//     w_p = sin^2(pi age_p / latency).
+//     w_p = sin(pi age_p / latency).
+//
+// The squares of a layer's weights add up to a constant, so that the contrast-preserving blend turns from one picture
+// to the next at a steady pace (sin^2, which adds up to 1 itself, is twice as fast midway, and shows it).
 //
 // The layers' latencies double. A short one keeps the texture's look and shows motion badly, a long one follows the
 // flow and stretches. Which one a place needs is measured, not assumed: from the Jacobians J of the coordinates comes
@@ -182,8 +185,7 @@ static Weighing weighing_of(const RfEulerian *eulerian)
         // Before its first turn a set is less deformed than its phase says, so the first frames show long latencies and
         // turn to shorter ones gradually.
         double age = rf_turn_age(eulerian->turns[set], c->time - c->start);
-        double wave = sin((double)RF_PI * age / eulerian->turns[set].period);
-        weighing.weights[set] = (float)(wave * wave);
+        weighing.weights[set] = (float)sin((double)RF_PI * age / eulerian->turns[set].period);
         weighing.ages[set] = (float)age;
     }
     return weighing;
