@@ -81,7 +81,7 @@ static void parse(int argc, char **argv, Settings *s)
     }
     RfOptionKind kind;
     float *radius = stepper_field(s->method, &s->options, "particle-radius", &kind);
-    if (radius && *radius == 0)
+    if (radius && *radius == 0 && strcmp(s->method->name, "sprites") != 0)
         *radius = (float)s->size / 8;
 }
 

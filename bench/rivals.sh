@@ -9,9 +9,9 @@ frames=${2:-198}
 settings=("lagrangian" "paper" "warp"
     "dual reset-every=8" "dual reset-every=12" "dual reset-every=16" "dual" "dual reset-every=32" "dual reset-every=48"
     "dual reset-every=96" "dual scatter=0" "dual blend=0" "dual blend=0 scatter=0"
-    "eulerian" "eulerian latency=12" "eulerian latency=16" "eulerian max-distortion=1.25" "eulerian max-distortion=1.5"
-    "eulerian phases=3" "eulerian blend=0" "eulerian layers=1" "eulerian layers=1 latency=12" "eulerian layers=1 latency=96"
-    "sprites" "sprites turn=0" "sprites fade=0.5" "sprites fade=2" "sprites particle-radius=20" "sprites particle-radius=48"
+    "eulerian" "eulerian latency=16 max-distortion=1.4" "eulerian max-distortion=1.5"
+    "eulerian phases=3" "eulerian blend=0" "eulerian layers=1" "eulerian layers=1 latency=96"
+    "sprites" "sprites turn=0" "sprites fade=0.5" "sprites fade=2" "sprites particle-radius=14" "sprites particle-radius=32"
     "sprites candidates=1")
 for setting in "${settings[@]}"; do
     for exemplar in foam noise; do

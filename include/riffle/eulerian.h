@@ -13,14 +13,14 @@ typedef struct RfEulerianOptions
     uint32_t struct_size;
     /// Where in the exemplar coordinates start is drawn from it. Default 1.
     uint64_t seed;
-    /// Frames that the first layer's coordinates live, 4 to 100000. Default 12. Each further layer's live twice as
+    /// Frames that the first layer's coordinates live, 4 to 100000. Default 24. Each further layer's live twice as
     /// long.
     int latency;
     /// 1 to 3. Default 3. With 1 the whole frame has one latency.
     int layers;
     /// Sets of coordinates a layer, started in turn, 2 or 3. Default 2. 3 pulse less and blend more.
     int phases;
-    /// Stretch or squash that a layer may have on average, 1.01 to 100. Default 1.5. Where a layer has more, a shorter
+    /// Stretch or squash that a layer may have on average, 1.01 to 100. Default 1.25. Where a layer has more, a shorter
     /// latency shows.
     float max_distortion;
     /// How pictures are summed: RF_BLEND_PLAIN or RF_BLEND_CONTRAST, the default.

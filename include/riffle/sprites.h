@@ -12,7 +12,7 @@ typedef struct RfSpritesOptions
     uint32_t struct_size;
     /// Same seed and same input: same bytes, with any number of threads. Default 1.
     uint64_t seed;
-    /// Poisson-disk radius d, in output pixels, 2 to 4096; 0 picks 64, or less where the exemplar is small. Smaller
+    /// Poisson-disk radius d, in output pixels, 2 to 4096; 0 picks 20, or less where the exemplar is small. Smaller
     /// follows the flow closer and blends more. An exemplar that does not tile must measure 3.9 d.
     float particle_radius;
     /// Sprites turn as the flow does round them. Default true. Otherwise they only move.

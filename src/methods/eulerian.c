@@ -72,13 +72,13 @@ struct RfEulerian
 static const RfOption g_options[] = {
     {"seed", RF_OPTION_UINT64, FIELD(seed), "", 0, 18446744073709551615.0, 1, NULL,
      "Where in the exemplar coordinates start is drawn from it."},
-    {"latency", RF_OPTION_INT, FIELD(latency), "frames", 4, 100000, 12, NULL,
+    {"latency", RF_OPTION_INT, FIELD(latency), "frames", 4, 100000, 24, NULL,
      "Frames that the first layer's coordinates live; each further layer's live twice as long."},
     {"layers", RF_OPTION_INT, FIELD(layers), "", 1, MAX_LAYERS, MAX_LAYERS, NULL,
      "Latencies to choose from at every pixel; with 1 the whole frame has one."},
     {"phases", RF_OPTION_INT, FIELD(phases), "", 2, MAX_PHASES, 2, NULL,
      "Sets of coordinates a layer, started in turn. 3 pulse less and blend more."},
-    {"max-distortion", RF_OPTION_FLOAT, FIELD(max_distortion), "", 1.01, 100, 1.5, NULL,
+    {"max-distortion", RF_OPTION_FLOAT, FIELD(max_distortion), "", 1.01, 100, 1.25, NULL,
      "Stretch or squash that a layer may have on average; where it has more, a shorter latency shows."},
     {"blend", RF_OPTION_CHOICE, FIELD(blend), "", 0, 1, RF_BLEND_CONTRAST, "plain|contrast",
      "Weighted mean, or the same with mean and variance kept."},
@@ -100,10 +100,10 @@ RfEulerianOptions rf_eulerian_defaults(void)
 {
     return (RfEulerianOptions){.struct_size = sizeof(RfEulerianOptions),
                                .seed = 1,
-                               .latency = 12,
+                               .latency = 24,
                                .layers = MAX_LAYERS,
                                .phases = 2,
-                               .max_distortion = 1.5f,
+                               .max_distortion = 1.25f,
                                .blend = RF_BLEND_CONTRAST};
 }
 

@@ -11,11 +11,10 @@
 // fluid goes on with what its surroundings tell, and the lattice's mean turn is the sprite's.
 #include "riffle/sprites.h"
 
+#include "core/maths.h"
 #include "core/options.h"
 #include "kernels/advection.h"
 #include "methods/lagrangian/lagrangian.h"
-
-#include <math.h>
 
 struct RfSprites
 {
@@ -34,7 +33,7 @@ static const RfOption g_options[] = {
     {"seed", RF_OPTION_UINT64, FIELD(seed), "", 0, 0x1p64, 1, NULL,
      "Another seed, another picture with the same look."},
     {"particle-radius", RF_OPTION_FLOAT, FIELD(particle_radius), "px", 0, 4096, 0, NULL,
-     "Poisson-disk radius d; 0 picks 64, or less for a small exemplar. Smaller follows the flow closer and blends "
+     "Poisson-disk radius d; 0 picks 20, or less for a small exemplar. Smaller follows the flow closer and blends "
      "more."},
     {"turn", RF_OPTION_BOOL, FIELD(turn), "", 0, 1, 1, NULL,
      "Sprites turn as the flow does round them; otherwise they only move."},
@@ -121,13 +120,24 @@ void rf_lagrangian_sprite_advect(const RfLagrangian *l, const StepFlow *flow, Rf
     }
 }
 
+// Smaller than a grid's: what a sprite cannot bend to, it must be too small to show.
+#define DEFAULT_RADIUS 20.0f
+#define LEAST_RADIUS 2.0f
+
+// As for grids, an exemplar that does not tile must measure one and a half of a sprite's grid, one that tiles one.
+static float default_radius(const RfExemplar *exemplar)
+{
+    float side = (float)rf_min_int(exemplar->width, exemplar->height) / GRID_SIDE;
+    return rf_clamp(exemplar->tiles ? side : side / 1.5f, LEAST_RADIUS, DEFAULT_RADIUS);
+}
+
 // ---- the front ---------------------------------------------------------------------------------------------------
 
 static RfResult make(const RfExemplar *exemplar, const RfSpritesOptions *options, RfSprites **out)
 {
     RfLagrangianOptions particles = rf_lagrangian_defaults();
     particles.seed = options->seed;
-    particles.particle_radius = options->particle_radius;
+    particles.particle_radius = options->particle_radius > 0 ? options->particle_radius : default_radius(exemplar);
     particles.fade = options->fade;
     particles.sharpness = options->sharpness;
     particles.candidates = options->candidates;
