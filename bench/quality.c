@@ -1,26 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges Lagrangian texture advection on the two-vortex scene: flow error by the fine estimator and by inverse search
+// Judges a method of texture advection on the two-vortex scene: flow error by the fine estimator and by inverse search
 // ("dis"), over the frame's own floor and over the exemplar's; spectrum distance over its floor; flicker and contrast.
 // "product" is the inverse search's ratio times the spectrum's.
 //
-//   bench_quality [EXEMPLAR] [size=256] [frames=200] [every=10] [out=FOLDER] [preset=default|paper] [label=TEXT]
-//   [OPTION=VALUE ...]
+//   bench_quality [EXEMPLAR] [size=256] [frames=200] [every=10] [out=FOLDER] [label=TEXT]
+//   [method=lagrangian|paper|eulerian|dual|sprites|warp] [OPTION=VALUE ...]
 //
-// EXEMPLAR is an image or a built-in one; an OPTION is any of the method's. One CSV line on stdout; with out= every
+// EXEMPLAR is an image or a built-in one; an OPTION is any of the method's and stands behind it; `paper` is lagrangian
+// with the paper's constants (preset=paper says the same). One CSV line on stdout; with out= every
 // `every`-th frame as a PNG there.
 
 #include "riffle/riffle.h"
 #include "support/scenes.h"
+#include "support/steppers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 typedef struct Settings
 {
     const char *exemplar, *out, *label;
     int size, frames, every;
-    RfLagrangianOptions options;
+    const Stepper *method;
+    StepperOptions options;
 } Settings;
 
 static void fail(const char *what)
@@ -29,34 +33,21 @@ static void fail(const char *what)
     exit(1);
 }
 
-static bool set_option(RfLagrangianOptions *options, const char *name, const char *value)
+static void set_method(Settings *s, const char *name)
 {
-    int count;
-    const RfOption *table = rf_lagrangian_option_table(&count);
-    for (int i = 0; i < count; ++i)
+    s->method = stepper_find(name);
+    if (!s->method)
     {
-        if (strcmp(table[i].name, name) != 0)
-            continue;
-        uint8_t *field = (uint8_t *)options + table[i].offset;
-        if (table[i].kind == RF_OPTION_FLOAT)
-            *(float *)(void *)field = (float)atof(value);
-        else if (table[i].kind == RF_OPTION_UINT64)
-            *(uint64_t *)(void *)field = strtoull(value, NULL, 10);
-        else
-            *(int *)(void *)field = atoi(value);
-        return true;
+        fprintf(stderr, "bench_quality: no method called %s\n", name);
+        exit(2);
     }
-    return false;
+    s->options = s->method->defaults();
 }
 
 static void parse(int argc, char **argv, Settings *s)
 {
-    *s = (Settings){.exemplar = "builtin:foam",
-                    .label = "",
-                    .size = 256,
-                    .frames = 200,
-                    .every = 10,
-                    .options = rf_lagrangian_defaults()};
+    *s = (Settings){.exemplar = "builtin:foam", .label = "", .size = 256, .frames = 200, .every = 10};
+    set_method(s, "lagrangian");
     for (int i = 1; i < argc; ++i)
     {
         char *equals = strchr(argv[i], '=');
@@ -77,16 +68,20 @@ static void parse(int argc, char **argv, Settings *s)
             s->out = value;
         else if (strcmp(argv[i], "label") == 0)
             s->label = value;
+        else if (strcmp(argv[i], "method") == 0)
+            set_method(s, value);
         else if (strcmp(argv[i], "preset") == 0)
-            s->options = strcmp(value, "paper") == 0 ? rf_lagrangian_paper() : rf_lagrangian_defaults();
-        else if (!set_option(&s->options, argv[i], value))
+            set_method(s, strcmp(value, "paper") == 0 ? "paper" : "lagrangian");
+        else if (!stepper_set(s->method, &s->options, argv[i], value))
         {
             fprintf(stderr, "bench_quality: no option called %s\n", argv[i]);
             exit(2);
         }
     }
-    if (s->options.particle_radius == 0)
-        s->options.particle_radius = (float)s->size / 8;
+    RfOptionKind kind;
+    float *radius = stepper_field(s->method, &s->options, "particle-radius", &kind);
+    if (radius && *radius == 0 && strcmp(s->method->name, "sprites") != 0)
+        *radius = (float)s->size / 8;
 }
 
 // What a run is made of, and what it has summed up.
@@ -95,7 +90,7 @@ typedef struct Run
     Settings settings;
     RfImage *image, *frame_image;
     RfExemplar *exemplar;
-    RfLagrangian *lagrangian;
+    void *method;
     RfImageView pixels, frame;
     SceneMoments scene;
     /// By inverse search, which also judges the rest, and by the finer estimator.
@@ -130,7 +125,7 @@ static void start(Run *run)
     int channels = run->pixels.channels, size = s->size;
     RfMapView map = {"colour", channels == 1 || channels == 3 ? RF_MAP_COLOUR : RF_MAP_DATA, run->pixels, 1};
     if (rf_exemplar_create(&map, 1, RF_TILING_AUTO, &run->exemplar) != RF_OK ||
-        rf_lagrangian_create(run->exemplar, &s->options, &run->lagrangian) != RF_OK ||
+        s->method->create(run->exemplar, &s->options, &run->method) != RF_OK ||
         rf_image_create(size, size, channels, &run->frame_image) != RF_OK)
         fail("create");
     rf_image_set_origin(run->frame_image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
@@ -143,7 +138,7 @@ static void start(Run *run)
 static void finish(Run *run)
 {
     scene_moments_free(&run->scene);
-    rf_lagrangian_destroy(run->lagrangian);
+    run->settings.method->destroy(run->method);
     rf_exemplar_destroy(run->exemplar);
     rf_image_destroy(run->image);
     rf_image_destroy(run->frame_image);
@@ -151,19 +146,27 @@ static void finish(Run *run)
     rf_measure_destroy(run->fine);
 }
 
-static void add_stats(Run *run, int frame)
+static void add_stats(Run *run, int frame, double seconds)
 {
-    RfLagrangianStats stats = rf_lagrangian_stats(run->lagrangian);
-    double share = 1.0 / run->settings.frames;
+    const Settings *s = &run->settings;
+    if (frame > 1)
+        run->ms += 1e3 * seconds / (s->frames - 1);
+    if (!s->method->stats)
+        return;
+    RfLagrangianStats stats = s->method->stats(run->method);
+    double share = 1.0 / s->frames;
     run->holes += stats.holes;
     run->layers += share * (double)stats.layers;
     run->live += share * stats.live;
     run->fading += share * stats.fading;
-    if (frame == 1)
-        return;
-    run->born += share * stats.born;
-    run->ms +=
-        1e3 * (stats.advect_seconds + stats.distribute_seconds + stats.draw_seconds) / (run->settings.frames - 1);
+    run->born += frame > 1 ? share * stats.born : 0;
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 static void keep_frame(const Run *run, int frame)
@@ -232,9 +235,10 @@ int main(int argc, char **argv)
     for (int f = 1; f <= run.settings.frames; ++f)
     {
         RfFlowView view = scene_step(&run.scene, f);
-        if (rf_lagrangian_step(run.lagrangian, &view, &run.frame) != RF_OK)
+        double started = now();
+        if (run.settings.method->step(run.method, &view, &run.frame) != RF_OK)
             fail("step");
-        add_stats(&run, f);
+        add_stats(&run, f, now() - started);
         if (run.settings.out && (f - 1) % every == 0)
             keep_frame(&run, f);
         if (f % every == 0 && f > 1)

@@ -4,8 +4,65 @@
 #include <assert.h>
 #include <string.h>
 
-static_assert(sizeof(RfLagrangianOptions) <= METHOD_OPTIONS_SIZE, "room for the options");
-static_assert(sizeof(RfWarpOptions) <= METHOD_OPTIONS_SIZE, "room for the options");
+// The verbs of a method, behind one type for all of them.
+#define METHOD_VERBS(name, Type)                                                                                       \
+    static_assert(sizeof(Type##Options) <= METHOD_OPTIONS_SIZE, "room for the options");                               \
+                                                                                                                       \
+    static RfResult name##_create(const RfExemplar *exemplar, const MethodOptions *options, void **out)                \
+    {                                                                                                                  \
+        Type *method = NULL;                                                                                           \
+        RfResult result = rf_##name##_create(exemplar, (const Type##Options *)options, &method);                       \
+        *out = method;                                                                                                 \
+        return result;                                                                                                 \
+    }                                                                                                                  \
+                                                                                                                       \
+    static RfResult name##_step(void *method, const RfFlowView *flow, const RfImageView *frame)                        \
+    {                                                                                                                  \
+        return rf_##name##_step(method, flow, frame);                                                                  \
+    }                                                                                                                  \
+                                                                                                                       \
+    static RfResult name##_advance(void *method, const RfFlowView *flow, int width, int height)                        \
+    {                                                                                                                  \
+        return rf_##name##_advance(method, flow, width, height);                                                       \
+    }                                                                                                                  \
+                                                                                                                       \
+    static RfResult name##_save(const void *method, void **block, size_t *size)                                        \
+    {                                                                                                                  \
+        return rf_##name##_save(method, block, size);                                                                  \
+    }                                                                                                                  \
+                                                                                                                       \
+    static RfResult name##_load(const RfExemplar *exemplar, const MethodOptions *options, const void *block,           \
+                                size_t size, void **out)                                                               \
+    {                                                                                                                  \
+        Type *method = NULL;                                                                                           \
+        RfResult result = rf_##name##_load(exemplar, (const Type##Options *)options, block, size, &method);            \
+        *out = method;                                                                                                 \
+        return result;                                                                                                 \
+    }                                                                                                                  \
+                                                                                                                       \
+    static void name##_destroy(void *method)                                                                           \
+    {                                                                                                                  \
+        rf_##name##_destroy(method);                                                                                   \
+    }
+
+// The defaults of a method without presets.
+#define METHOD_DEFAULTS(name, Type)                                                                                    \
+    static void name##_defaults(int preset, MethodOptions *options)                                                    \
+    {                                                                                                                  \
+        (void)preset;                                                                                                  \
+        Type##Options values = rf_##name##_defaults();                                                                 \
+        memcpy(options, &values, sizeof values);                                                                       \
+    }
+
+METHOD_VERBS(lagrangian, RfLagrangian)
+METHOD_VERBS(eulerian, RfEulerian)
+METHOD_DEFAULTS(eulerian, RfEulerian)
+METHOD_VERBS(dual, RfDual)
+METHOD_DEFAULTS(dual, RfDual)
+METHOD_VERBS(sprites, RfSprites)
+METHOD_DEFAULTS(sprites, RfSprites)
+METHOD_VERBS(warp, RfWarp)
+METHOD_DEFAULTS(warp, RfWarp)
 
 static void lagrangian_defaults(int preset, MethodOptions *options)
 {
@@ -13,108 +70,43 @@ static void lagrangian_defaults(int preset, MethodOptions *options)
     memcpy(options, &values, sizeof values);
 }
 
-static RfResult lagrangian_create(const RfExemplar *exemplar, const MethodOptions *options, void **out)
-{
-    RfLagrangian *lagrangian = NULL;
-    RfResult result = rf_lagrangian_create(exemplar, (const RfLagrangianOptions *)options, &lagrangian);
-    *out = lagrangian;
-    return result;
-}
-
-static RfResult lagrangian_step(void *method, const RfFlowView *flow, const RfImageView *frame)
-{
-    return rf_lagrangian_step(method, flow, frame);
-}
-
-static RfResult lagrangian_advance(void *method, const RfFlowView *flow, int width, int height)
-{
-    return rf_lagrangian_advance(method, flow, width, height);
-}
-
-static RfResult lagrangian_save(const void *method, void **block, size_t *size)
-{
-    return rf_lagrangian_save(method, block, size);
-}
-
-static RfResult lagrangian_load(const RfExemplar *exemplar, const MethodOptions *options, const void *block,
-                                size_t size, void **out)
-{
-    RfLagrangian *lagrangian = NULL;
-    RfResult result = rf_lagrangian_load(exemplar, (const RfLagrangianOptions *)options, block, size, &lagrangian);
-    *out = lagrangian;
-    return result;
-}
-
-static void lagrangian_destroy(void *method)
-{
-    rf_lagrangian_destroy(method);
-}
-
 static RfResult lagrangian_layers(const void *method, const RfImageView *layers)
 {
     return rf_lagrangian_layers(method, layers);
 }
 
-static int lagrangian_stages(const void *method, Stage stages[MAX_STAGES])
+static int particle_stages(RfLagrangianStats stats, Stage stages[MAX_STAGES])
 {
-    RfLagrangianStats stats = rf_lagrangian_stats(method);
     stages[0] = (Stage){"advect", stats.advect_seconds};
     stages[1] = (Stage){"distribute", stats.distribute_seconds};
     stages[2] = (Stage){"draw", stats.draw_seconds};
     return 3;
 }
 
-static void warp_defaults(int preset, MethodOptions *options)
+static int lagrangian_stages(const void *method, Stage stages[MAX_STAGES])
 {
-    (void)preset;
-    RfWarpOptions values = rf_warp_defaults();
-    memcpy(options, &values, sizeof values);
+    return particle_stages(rf_lagrangian_stats(method), stages);
 }
 
-static RfResult warp_create(const RfExemplar *exemplar, const MethodOptions *options, void **out)
+static int sprites_stages(const void *method, Stage stages[MAX_STAGES])
 {
-    RfWarp *warp = NULL;
-    RfResult result = rf_warp_create(exemplar, (const RfWarpOptions *)options, &warp);
-    *out = warp;
-    return result;
+    return particle_stages(rf_sprites_stats(method), stages);
 }
 
-static RfResult warp_step(void *method, const RfFlowView *flow, const RfImageView *frame)
-{
-    return rf_warp_step(method, flow, frame);
-}
-
-static RfResult warp_advance(void *method, const RfFlowView *flow, int width, int height)
-{
-    return rf_warp_advance(method, flow, width, height);
-}
-
-static RfResult warp_save(const void *method, void **block, size_t *size)
-{
-    return rf_warp_save(method, block, size);
-}
-
-static RfResult warp_load(const RfExemplar *exemplar, const MethodOptions *options, const void *block, size_t size,
-                          void **out)
-{
-    RfWarp *warp = NULL;
-    RfResult result = rf_warp_load(exemplar, (const RfWarpOptions *)options, block, size, &warp);
-    *out = warp;
-    return result;
-}
-
-static void warp_destroy(void *method)
-{
-    rf_warp_destroy(method);
-}
+// The last three differ: presets, layers, stages.
+#define METHOD(name, sentence, presets, layers, stages)                                                                \
+    {                                                                                                                  \
+#name, sentence, presets, rf_##name##_option_table, name##_defaults, name##_create, name##_step,               \
+            name##_advance, name##_save, name##_load, name##_destroy, layers, stages                                   \
+    }
 
 static const Method g_methods[] = {
-    {"lagrangian", "textured grids that follow the flow, fade in and out and are blended: the spectrum stays",
-     "default|paper", rf_lagrangian_option_table, lagrangian_defaults, lagrangian_create, lagrangian_step,
-     lagrangian_advance, lagrangian_save, lagrangian_load, lagrangian_destroy, lagrangian_layers, lagrangian_stages},
-    {"warp", "coordinates carried for ever: follows exactly and stretches without end, for comparison", NULL,
-     rf_warp_option_table, warp_defaults, warp_create, warp_step, warp_advance, warp_save, warp_load, warp_destroy,
-     NULL, NULL},
+    METHOD(lagrangian, "textured grids that follow the flow, fade in and out and are blended: the spectrum stays",
+           "default|paper", lagrangian_layers, lagrangian_stages),
+    METHOD(eulerian, "layers of carried coordinates, regenerated sooner where the flow deforms more", NULL, NULL, NULL),
+    METHOD(dual, "two layers of carried coordinates that start afresh in turn", NULL, NULL, NULL),
+    METHOD(sprites, "round pieces of the exemplar that the flow carries and does not bend", NULL, NULL, sprites_stages),
+    METHOD(warp, "coordinates carried for ever: follows exactly and stretches without end", NULL, NULL, NULL),
 };
 
 const Method *method_table(int *count)

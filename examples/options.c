@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints a table of the library as Markdown, as it stands in docs/:
 //
-//     options lagrangian|warp|measure|quantities|flow|exemplar
+//     options lagrangian|eulerian|dual|sprites|warp|measure|quantities|flow|exemplar
 //
 // Options of a method or of the measures, the quantities these give, or the built-in flows or exemplars. A test holds
 // the docs to it (cmake/doc_tables.sh).
@@ -100,6 +100,12 @@ int main(int argc, char **argv)
     const RfOption *table = NULL;
     if (strcmp(what, "lagrangian") == 0)
         table = rf_lagrangian_option_table(&count);
+    else if (strcmp(what, "eulerian") == 0)
+        table = rf_eulerian_option_table(&count);
+    else if (strcmp(what, "dual") == 0)
+        table = rf_dual_option_table(&count);
+    else if (strcmp(what, "sprites") == 0)
+        table = rf_sprites_option_table(&count);
     else if (strcmp(what, "warp") == 0)
         table = rf_warp_option_table(&count);
     else if (strcmp(what, "measure") == 0)
@@ -113,7 +119,7 @@ int main(int argc, char **argv)
     }
     if (!table)
     {
-        fprintf(stderr, "usage: options lagrangian|warp|measure|quantities|flow|exemplar\n");
+        fprintf(stderr, "usage: options lagrangian|eulerian|dual|sprites|warp|measure|quantities|flow|exemplar\n");
         return 2;
     }
     print_options(table, count);

@@ -121,6 +121,17 @@ RF_API int rf_exemplar_map_count(const RfExemplar *exemplar);
 /// in a frame.
 RF_API RfMapView rf_exemplar_map(const RfExemplar *exemplar, int index, int *first_channel);
 
+/// How pictures that overlap are summed. Not every method has every form.
+typedef enum RfBlend
+{
+    /// Weighted mean: loses contrast where pictures overlap (equation 2 of Yu and others 2009).
+    RF_BLEND_PLAIN,
+    /// Keeps mean and variance (equation 3 with its root and mean put back).
+    RF_BLEND_CONTRAST,
+    /// Keeps the whole histogram: blends Gaussianised colours and maps them back (Heitz and Neyret 2018).
+    RF_BLEND_HISTOGRAM
+} RfBlend;
+
 /// A flow round one moment. Velocity in flow cells a frame, x right and y DOWN; sample (i, j) sits at the centre of
 /// cell (i, j). Frame and flow cover the same domain whatever their sizes.
 ///

@@ -7,17 +7,6 @@
 
 #include "data.h"
 
-typedef enum RfBlend
-{
-    /// Weighted mean: loses contrast where grids overlap (equation 2 of the paper).
-    RF_BLEND_PLAIN,
-    /// Keeps mean and variance (equation 3 with its root and mean put back), and allows for pictures that resemble each
-    /// other.
-    RF_BLEND_CONTRAST,
-    /// Keeps the whole histogram: blends Gaussianised colours and maps them back (Heitz and Neyret 2018).
-    RF_BLEND_HISTOGRAM
-} RfBlend;
-
 /// Start from rf_lagrangian_defaults() or rf_lagrangian_paper(). A struct that did not is refused.
 typedef struct RfLagrangianOptions
 {
@@ -55,7 +44,8 @@ typedef struct RfLagrangianOptions
     /// there now is taken. 1 takes any.
     int candidates;
 
-    /// How overlapping grids are summed. Default RF_BLEND_CONTRAST.
+    /// How overlapping grids are summed. Default RF_BLEND_CONTRAST, which here allows for grids that resemble each
+    /// other.
     RfBlend blend;
 
     /// Frames a second: turns `fade` into frames. 0.01 to 10000. Default 24.

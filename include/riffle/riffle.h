@@ -4,8 +4,11 @@
 
 #include "base.h"
 #include "data.h"
+#include "dual.h"
+#include "eulerian.h"
 #include "io.h"
 #include "lagrangian.h"
 #include "measure.h"
 #include "render.h"
+#include "sprites.h"
 #include "warp.h"

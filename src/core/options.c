@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/options.h"
+#include "core/hash.h"
 #include "core/result.h"
 
 #include <string.h>
@@ -50,4 +51,15 @@ RfResult rf_options_check(const void *options, uint32_t struct_size, size_t size
                    table[i].maximum);
     }
     return RF_OK;
+}
+
+uint64_t rf_options_hash(const void *options, const RfOption *table, int count, uint64_t seed)
+{
+    uint64_t hash = seed;
+    for (int i = 0; i < count; ++i)
+    {
+        size_t size = table[i].kind == RF_OPTION_UINT64 ? 8 : table[i].kind == RF_OPTION_BOOL ? 1 : 4;
+        hash = rf_hash_bytes((const uint8_t *)options + table[i].offset, size, hash);
+    }
+    return hash;
 }

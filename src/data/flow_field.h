@@ -72,6 +72,13 @@ static inline bool rf_flow_inside(const RfFlowView *view, float x, float y)
     return fluid >= 0.5f;
 }
 
+/// The same for the centre of a pixel of a width x height frame.
+static inline bool rf_pixel_inside(const RfFlowView *view, int width, int height, int x, int y)
+{
+    return rf_flow_inside(view, ((float)x + 0.5f) * (float)view->width / (float)width,
+                          ((float)y + 0.5f) * (float)view->height / (float)height);
+}
+
 /// Velocity at a point in flow cells (cell (i, j) is centred on i + 0.5, j + 0.5), bilinear over the fluid's cells
 /// alone, so that land does not slow the shore; 0 with no fluid cell near; outside the domain the border's. `blend`
 /// from rf_flow_blend.

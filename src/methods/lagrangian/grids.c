@@ -235,7 +235,10 @@ static void advect_one(void *context, int index, int worker)
     int n = l->options.grid_vertices;
     size_t first = (size_t)index * (size_t)(n * n);
     bool inside[RF_MAX_GRID_VERTICES * RF_MAX_GRID_VERTICES];
-    rf_advect_grid(l->x + first, l->y + first, inside, n, job->flow->view, job->flow->from, l->width, l->height);
+    if (l->rigid)
+        rf_lagrangian_sprite_advect(l, job->flow, l->grids[index].centre, l->x + first, l->y + first, inside);
+    else
+        rf_advect_grid(l->x + first, l->y + first, inside, n, job->flow->view, job->flow->from, l->width, l->height);
     measure_grid(l, job->flow, index, inside);
 }
 

@@ -77,6 +77,8 @@ struct RfLagrangian
 {
     const RfExemplar *exemplar;
     RfLagrangianOptions options;
+    /// Sprites: grids do not bend; whether they turn with the flow.
+    bool rigid, turning;
     Material material;
     /// Halvings of the exemplar at which new grids are matched first.
     int match_halvings;
@@ -115,6 +117,13 @@ float rf_lagrangian_grid_fade(const Grid *grid, double time);
 /// Frames that a fade takes where the flow strains at this rate. The fainter the others that a grid takes over from (0
 /// to 1), the sooner they will be gone, and the shorter.
 float rf_lagrangian_fade_length(const RfLagrangian *l, float strain, float others);
+
+/// sprites.c: as rf_advect_grid for the vertices of a rigid grid.
+void rf_lagrangian_sprite_advect(const RfLagrangian *l, const StepFlow *flow, RfVec2 centre, float *x, float *y,
+                                 bool *inside);
+
+/// state.c: brings a saved state into a stepper that was just made.
+RfResult rf_lagrangian_restore(RfLagrangian *l, const void *block, size_t size);
 
 /// refill.c
 int rf_lagrangian_coarsest_halvings(const RfLagrangian *l);

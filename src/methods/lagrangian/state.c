@@ -6,6 +6,7 @@
 
 #include "core/hash.h"
 #include "core/maths.h"
+#include "core/options.h"
 #include "core/result.h"
 #include "core/simd.h"
 
@@ -29,18 +30,11 @@ typedef struct Header
     uint32_t next_id, padding;
 } Header;
 
-// Field by field: the struct's padding has no defined bytes.
-static uint64_t hash_options(const RfLagrangianOptions *options)
+static uint64_t hash_options(const RfLagrangian *l)
 {
     int count;
     const RfOption *table = rf_lagrangian_option_table(&count);
-    uint64_t hash = VERSION;
-    for (int i = 0; i < count; ++i)
-    {
-        size_t size = table[i].kind == RF_OPTION_UINT64 ? 8 : table[i].kind == RF_OPTION_BOOL ? 1 : 4;
-        hash = rf_hash_bytes((const uint8_t *)options + table[i].offset, size, hash);
-    }
-    return hash;
+    return rf_options_hash(&l->options, table, count, VERSION + (l->rigid ? 256 : 0) + (l->turning ? 512 : 0));
 }
 
 static uint64_t hash_content(Header header, const uint8_t *content, size_t size)
@@ -75,7 +69,7 @@ RfResult rf_lagrangian_save(const RfLagrangian *l, void **block, size_t *size)
                      .grid_size = sizeof(Grid),
                      .simd = (uint32_t)rf_simd_level(),
                      .exemplar_hash = l->exemplar->hash,
-                     .options_hash = hash_options(&l->options),
+                     .options_hash = hash_options(l),
                      .width = l->width,
                      .height = l->height,
                      .count = l->count,
@@ -99,7 +93,7 @@ static RfResult check_header(const Header *header, const RfLagrangian *l, const 
     if (header->simd != (uint32_t)rf_simd_level())
         return rf_fail(RF_BAD_INPUT, NULL, "header",
                        "saved with another instruction set than %s: set RF_SIMD to it, or start again", rf_simd_name());
-    if (header->exemplar_hash != l->exemplar->hash || header->options_hash != hash_options(&l->options))
+    if (header->exemplar_hash != l->exemplar->hash || header->options_hash != hash_options(l))
         return rf_fail(RF_BAD_INPUT, NULL, "header",
                        "saved with another exemplar or other options: start again without it");
     size_t vertices = (size_t)(l->options.grid_vertices * l->options.grid_vertices) * sizeof(float);
@@ -114,7 +108,7 @@ static RfResult check_header(const Header *header, const RfLagrangian *l, const 
     return RF_OK;
 }
 
-static RfResult restore(RfLagrangian *l, const Header *header, const void *block)
+static RfResult copy_content(RfLagrangian *l, const Header *header, const void *block)
 {
     RF_TRY(rf_lagrangian_grids_reserve(l, header->count));
     l->width = header->width;
@@ -139,27 +133,28 @@ static RfResult restore(RfLagrangian *l, const Header *header, const void *block
     return RF_OK;
 }
 
-RfResult rf_lagrangian_load(const RfExemplar *exemplar, const RfLagrangianOptions *options, const void *block,
-                            size_t size, RfLagrangian **out)
+RfResult rf_lagrangian_restore(RfLagrangian *l, const void *block, size_t size)
 {
-    RF_REQUIRE(block && out, "rf_lagrangian_load: block or out is NULL");
-    *out = NULL;
     Header header;
     if (size < sizeof header)
         return rf_fail(RF_BAD_INPUT, NULL, "header",
                        "the saved state ends inside its header (%zu of %zu bytes): start again without it", size,
                        sizeof header);
     memcpy(&header, block, sizeof header);
-    RfLagrangian *l;
-    RF_TRY(rf_lagrangian_create(exemplar, options, &l));
-    RfResult result = check_header(&header, l, block, size);
-    if (result == RF_OK)
-        result = restore(l, &header, block);
+    RF_TRY(check_header(&header, l, block, size));
+    return copy_content(l, &header, block);
+}
+
+RfResult rf_lagrangian_load(const RfExemplar *exemplar, const RfLagrangianOptions *options, const void *block,
+                            size_t size, RfLagrangian **out)
+{
+    RF_REQUIRE(block && out, "rf_lagrangian_load: block or out is NULL");
+    RF_TRY(rf_lagrangian_create(exemplar, options, out));
+    RfResult result = rf_lagrangian_restore(*out, block, size);
     if (result != RF_OK)
     {
-        rf_lagrangian_destroy(l);
-        return result;
+        rf_lagrangian_destroy(*out);
+        *out = NULL;
     }
-    *out = l;
-    return RF_OK;
+    return result;
 }

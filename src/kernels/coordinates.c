@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: Apache-2.0
+// Max, Becker. Flow visualization using moving textures. 1995.
+// Stam. Stable fluids. 1999 (tracing back).
+//
+// What is carried is not the coordinate but its offset from the pixel,
+//
+//     coordinate(x) = origin + x + offset(x),    offset'(x) = (p - x) + offset(p),
+//
+// p the point where x was at the last step. The offset starts at 0 and is extended beyond the domain by its border's
+// value, so that what flows in continues the exemplar instead of repeating a border pixel. p is found by the midpoint
+// rule through the unsteady velocity, once for all sets; the offset is interpolated once a step by cubic splines:
+// bilinear interpolation would smooth the coordinates by a pixel in some tens of frames, and the texture would
+// straighten where it should wind up. On land the offset of the nearest fluid pixel stands, so that the spline sees no
+// jump at the shore.
+#include "kernels/coordinates.h"
+
+#include "core/hash.h"
+#include "core/memory.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "core/result.h"
+#include "core/simd.h"
+#include "kernels/cubic_spline.h"
+
+#include <string.h>
+
+enum
+{
+    BAND = 8
+};
+
+// Longest stretch of a path, in flow cells, that one midpoint step traces.
+static const float PATH_STEP = 4.0f;
+// Offsets in pixels stay under it, so that absurd speeds cannot make them infinite.
+static const float FARTHEST = 1e6f;
+
+typedef struct Carry
+{
+    RfCoordinates *coordinates;
+    const RfFlowView *flow;
+    /// Flow cells a pixel.
+    float scale_x, scale_y;
+    double from;
+    int path_steps;
+} Carry;
+
+static float max_speed(const float *velocity, size_t cells)
+{
+    float square = 0;
+    for (size_t k = 0; k < cells; ++k)
+    {
+        float s = velocity[2 * k] * velocity[2 * k] + velocity[2 * k + 1] * velocity[2 * k + 1];
+        square = s > square ? s : square;
+    }
+    return sqrtf(square);
+}
+
+static int path_steps(const RfFlowView *flow, double dt)
+{
+    size_t cells = (size_t)flow->width * (size_t)flow->height;
+    float speed = max_speed(flow->velocity, cells);
+    if (flow->next_velocity)
+        speed = fmaxf(speed, max_speed(flow->next_velocity, cells));
+    // At least a step a frame, since the velocity may change from frame to frame.
+    double steps = ceil(fmax(dt * (double)speed / (double)PATH_STEP, dt));
+    return steps > 256 ? 256 : steps > 1 ? (int)steps : 1;
+}
+
+// Where the point was at the last step, in flow cells.
+static RfVec2 trace_back(const Carry *carry, RfVec2 p)
+{
+    double dt = (carry->flow->time - carry->from) / carry->path_steps, time = carry->flow->time;
+    for (int i = 0; i < carry->path_steps; ++i, time -= dt)
+    {
+        RfVec2 v = rf_flow_sample(carry->flow, p.x, p.y, rf_flow_blend(carry->flow, time));
+        float half = 0.5f * (float)dt;
+        v = rf_flow_sample(carry->flow, p.x - half * v.x, p.y - half * v.y,
+                           rf_flow_blend(carry->flow, time - 0.5 * dt));
+        p = (RfVec2){p.x - (float)dt * v.x, p.y - (float)dt * v.y};
+    }
+    return p;
+}
+
+static void carry_band(void *context, int item, int worker)
+{
+    (void)worker;
+    const Carry *carry = context;
+    const RfCoordinates *c = carry->coordinates;
+    int end = rf_min_int((item + 1) * BAND, c->height), numbers = 2 * c->sets;
+    for (int y = item * BAND; y < end; ++y)
+        for (int x = 0; x < c->width; ++x)
+        {
+            RfVec2 here = {((float)x + 0.5f) * carry->scale_x, ((float)y + 0.5f) * carry->scale_y};
+            RfVec2 there = trace_back(carry, here);
+            float moved[2] = {(there.x - here.x) / carry->scale_x, (there.y - here.y) / carry->scale_y};
+            float old[2 * RF_MAX_COORDINATE_SETS];
+            rf_spline_sample(c->offset, c->width, c->height, numbers, numbers, (float)x + moved[0], (float)y + moved[1],
+                             old);
+            float *out = c->next + (size_t)numbers * ((size_t)y * (size_t)c->width + (size_t)x);
+            for (int k = 0; k < numbers; ++k)
+                out[k] = rf_clamp(moved[k % 2] + old[k], -FARTHEST, FARTHEST);
+        }
+}
+
+// Takes neighbour (x + dx, y + dy)'s nearest fluid pixel if that is nearer to (x, y).
+static void pass_on(const RfCoordinates *c, int x, int y, int dx, int dy)
+{
+    if (x + dx < 0 || x + dx >= c->width || y + dy < 0 || y + dy >= c->height)
+        return;
+    int32_t *own = c->nearest + (size_t)y * (size_t)c->width + (size_t)x;
+    int32_t other = own[(ptrdiff_t)dy * c->width + dx];
+    if (other < 0)
+        return;
+    int64_t ox = other % c->width - x, oy = other / c->width - y;
+    int64_t nx = *own % c->width - x, ny = *own / c->width - y;
+    if (*own < 0 || ox * ox + oy * oy < nx * nx + ny * ny)
+        *own = other;
+}
+
+// Land takes the offsets of its nearest fluid pixel (Danielsson. Euclidean distance mapping. 1980).
+static void extend_over_land(const RfCoordinates *c, const RfFlowView *flow)
+{
+    int w = c->width, h = c->height;
+    for (int y = 0; y < h; ++y)
+        for (int x = 0; x < w; ++x)
+        {
+            size_t k = (size_t)y * (size_t)w + (size_t)x;
+            c->nearest[k] = rf_pixel_inside(flow, w, h, x, y) ? (int32_t)k : -1;
+        }
+    for (int y = 0; y < h; ++y)
+    {
+        for (int x = 0; x < w; ++x)
+            for (int dx = -1; dx <= 1; ++dx)
+                pass_on(c, x, y, dx, dx < 0 ? 0 : -1);
+        for (int x = w - 1; x >= 0; --x)
+            pass_on(c, x, y, 1, 0);
+    }
+    for (int y = h - 1; y >= 0; --y)
+    {
+        for (int x = w - 1; x >= 0; --x)
+            for (int dx = -1; dx <= 1; ++dx)
+                pass_on(c, x, y, dx, dx > 0 ? 0 : 1);
+        for (int x = 0; x < w; ++x)
+            pass_on(c, x, y, -1, 0);
+    }
+    size_t numbers = 2 * (size_t)c->sets;
+    for (size_t k = 0; k < (size_t)w * (size_t)h; ++k)
+        if (c->nearest[k] >= 0 && c->nearest[k] != (int32_t)k)
+            memcpy(c->offset + numbers * k, c->offset + numbers * (size_t)c->nearest[k], numbers * sizeof(float));
+}
+
+static void carry_offsets(RfCoordinates *c, const RfFlowView *flow)
+{
+    Carry carry = {.coordinates = c,
+                   .flow = flow,
+                   .scale_x = (float)flow->width / (float)c->width,
+                   .scale_y = (float)flow->height / (float)c->height,
+                   .from = c->time,
+                   .path_steps = path_steps(flow, flow->time - c->time)};
+    rf_spline_prefilter(c->offset, c->width, c->height, 2 * c->sets);
+    rf_parallel_for((c->height + BAND - 1) / BAND, carry_band, &carry);
+    float *swap = c->offset;
+    c->offset = c->next;
+    c->next = swap;
+    if (flow->mask)
+        extend_over_land(c, flow);
+}
+
+static RfResult place(RfCoordinates *c, int width, int height)
+{
+    size_t pixels = (size_t)width * (size_t)height, pixel = 2 * (size_t)c->sets * sizeof(float);
+    float *offset = rf_allocate_zero(pixels, pixel), *next = rf_allocate(pixels, pixel);
+    if (!offset || !next)
+    {
+        rf_release(offset);
+        rf_release(next);
+        return RF_OUT_OF_MEMORY;
+    }
+    c->offset = offset;
+    c->next = next;
+    c->width = width;
+    c->height = height;
+    return RF_OK;
+}
+
+RfResult rf_coordinates_move(RfCoordinates *c, const char *stage, const RfFlowView *flow, int width, int height)
+{
+    RF_REQUIRE(width >= 1 && width <= RF_MAX_SIZE && height >= 1 && height <= RF_MAX_SIZE,
+               "frame: %d x %d: each side must be 1 to %d", width, height, RF_MAX_SIZE);
+    RF_TRY(rf_flow_view_check(flow));
+    RF_REQUIRE(!c->placed || (width == c->width && height == c->height),
+               "frame: %d x %d after frames of %d x %d: the size must stay", width, height, c->width, c->height);
+    RF_REQUIRE(!c->placed || flow->time >= c->time, "flow: time %g after %g: times must not decrease", flow->time,
+               c->time);
+    // At the door: a step, once begun, is ended.
+    RF_TRY(rf_progress(stage, 0));
+    if (flow->mask && !c->nearest)
+    {
+        c->nearest = rf_allocate((size_t)width * (size_t)height, sizeof(int32_t));
+        if (!c->nearest)
+            return RF_OUT_OF_MEMORY;
+    }
+    if (!c->placed)
+    {
+        RF_TRY(place(c, width, height));
+        c->start = flow->time;
+    }
+    else if (flow->time > c->time)
+        carry_offsets(c, flow);
+    c->placed = true;
+    c->time = flow->time;
+    return RF_OK;
+}
+
+void rf_coordinates_reset(RfCoordinates *c, int set)
+{
+    size_t pixels = (size_t)c->width * (size_t)c->height, numbers = 2 * (size_t)c->sets;
+    for (size_t k = 0; k < pixels; ++k)
+        c->offset[k * numbers + 2 * (size_t)set] = c->offset[k * numbers + 2 * (size_t)set + 1] = 0;
+}
+
+void rf_coordinates_free(RfCoordinates *c)
+{
+    rf_release(c->offset);
+    rf_release(c->next);
+    rf_release(c->nearest);
+    *c = (RfCoordinates){0};
+}
+
+RfJacobian rf_coordinates_jacobian(const RfCoordinates *c, int set, int x, int y)
+{
+    int left = rf_max_int(x - 1, 0), right = rf_min_int(x + 1, c->width - 1);
+    int up = rf_max_int(y - 1, 0), down = rf_min_int(y + 1, c->height - 1);
+    RfVec2 l = rf_coordinates_offset(c, set, left, y), r = rf_coordinates_offset(c, set, right, y),
+           u = rf_coordinates_offset(c, set, x, up), d = rf_coordinates_offset(c, set, x, down);
+    float ix = 1.0f / (float)rf_max_int(right - left, 1), iy = 1.0f / (float)rf_max_int(down - up, 1);
+    return (RfJacobian){1 + (r.x - l.x) * ix, (d.x - u.x) * iy, (r.y - l.y) * ix, 1 + (d.y - u.y) * iy};
+}
+
+// ---- saved state -------------------------------------------------------------------------------------------------
+
+enum
+{
+    STATE_VERSION = 2
+};
+
+typedef struct StateHeader
+{
+    char magic[8];
+    uint32_t version, simd;
+    /// Given by the method; and of the whole block with this field 0.
+    uint64_t inputs, content;
+    int32_t width, height, sets, padding;
+    double start, time;
+} StateHeader;
+
+static uint64_t content_hash(StateHeader header, const void *offsets, size_t size)
+{
+    header.content = 0;
+    return rf_hash_bytes(offsets, size, rf_hash_bytes(&header, sizeof header, 0));
+}
+
+static void copy_magic(char to[8], const char *magic)
+{
+    memset(to, 0, 8);
+    memcpy(to, magic, strlen(magic));
+}
+
+RfResult rf_coordinates_save(const RfCoordinates *c, const char *magic, uint64_t inputs, void **block, size_t *size)
+{
+    *block = NULL;
+    StateHeader header = {.version = STATE_VERSION,
+                          .simd = (uint32_t)rf_simd_level(),
+                          .inputs = inputs,
+                          .width = c->width,
+                          .height = c->height,
+                          .sets = c->sets,
+                          .start = c->start,
+                          .time = c->time};
+    copy_magic(header.magic, magic);
+    size_t offsets = 2 * sizeof(float) * (size_t)c->sets * (size_t)c->width * (size_t)c->height;
+    uint8_t *bytes = rf_allocate(sizeof header + offsets, 1);
+    if (!bytes)
+        return RF_OUT_OF_MEMORY;
+    if (offsets)
+        memcpy(bytes + sizeof header, c->offset, offsets);
+    header.content = content_hash(header, bytes + sizeof header, offsets);
+    memcpy(bytes, &header, sizeof header);
+    *block = bytes;
+    *size = sizeof header + offsets;
+    return RF_OK;
+}
+
+static RfResult check_state(const StateHeader *header, int sets, const char *magic, uint64_t inputs, const void *block,
+                            size_t size)
+{
+    char wanted[8];
+    copy_magic(wanted, magic);
+    if (memcmp(header->magic, wanted, 8) != 0)
+        return rf_fail(RF_BAD_INPUT, NULL, "header", "not a saved state of %s", magic);
+    if (header->version != STATE_VERSION)
+        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved by version %u of the format, this is %d: start again",
+                       header->version, STATE_VERSION);
+    if (header->simd != (uint32_t)rf_simd_level())
+        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved under another instruction set: set RF_SIMD as it was");
+    if (header->inputs != inputs)
+        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved with another exemplar or other options: start again");
+    bool empty = header->width == 0 && header->height == 0;
+    bool sized = header->width >= 1 && header->width <= RF_MAX_SIZE && header->height >= 1 &&
+                 header->height <= RF_MAX_SIZE && isfinite(header->start) && isfinite(header->time);
+    uint64_t offsets = 2 * sizeof(float) * (uint64_t)(uint32_t)sets * (uint64_t)(uint32_t)header->width *
+                       (uint64_t)(uint32_t)header->height;
+    if (header->sets != sets || (!empty && !sized) || size - sizeof *header != offsets ||
+        header->content != content_hash(*header, (const uint8_t *)block + sizeof *header, size - sizeof *header))
+        return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
+    return RF_OK;
+}
+
+RfResult rf_coordinates_load(RfCoordinates *out, const char *magic, uint64_t inputs, const void *block, size_t size)
+{
+    StateHeader header;
+    if (size < sizeof header)
+        return rf_fail(RF_BAD_INPUT, NULL, "header", "a saved state is at least %zu bytes, this is %zu", sizeof header,
+                       size);
+    memcpy(&header, block, sizeof header);
+    RF_TRY(check_state(&header, out->sets, magic, inputs, block, size));
+    if (header.width)
+    {
+        RF_TRY(place(out, header.width, header.height));
+        memcpy(out->offset, (const uint8_t *)block + sizeof header, size - sizeof header);
+    }
+    out->placed = header.width > 0;
+    out->start = header.start;
+    out->time = header.time;
+    return RF_OK;
+}
