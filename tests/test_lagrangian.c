@@ -297,8 +297,8 @@ enum
     MAX_BLOCKS = MAX_PIXELS / (BLOCK * BLOCK)
 };
 
-// Changes of all judged blocks of a run, in grey levels, sorted; of its steps with births and of those without the
-// largest.
+// Changes of all judged blocks of a run, in grey levels, sorted; and the mean over its steps with births, and over
+// those without, of a step's largest.
 typedef struct Changes
 {
     float *all;
@@ -337,14 +337,17 @@ static Changes find_changes(RfLagrangian *lagrangian, RfFlow *flow, SceneMoments
         assert_int_equal(rf_measure_block_changes(&pair, g_displacement, BLOCK, blocks), RF_OK);
         bool birth = rf_lagrangian_stats(lagrangian).born > 0;
         ++*(birth ? &changes.births : &changes.calm);
-        double *largest = birth ? &changes.with : &changes.without;
+        double largest = 0;
         for (int k = 0; k < width / BLOCK * (height / BLOCK); ++k)
             if (blocks[k] >= 0)
             {
-                *largest = fmax(*largest, (double)blocks[k]);
+                largest = fmax(largest, (double)blocks[k]);
                 changes.all[changes.count++] = blocks[k];
             }
+        *(birth ? &changes.with : &changes.without) += largest;
     }
+    changes.with /= changes.births;
+    changes.without /= changes.calm;
     qsort(changes.all, changes.count, sizeof *changes.all, ascending);
     return changes;
 }
@@ -361,10 +364,15 @@ static void a_birth_is_not_seen(void **state)
     RfLagrangian *lagrangian = make(exemplar, options_of(20, RF_BLEND_CONTRAST));
     SceneMoments moments = scene_moments(box, N, N);
     Changes changes = find_changes(lagrangian, NULL, &moments, N, N, FRAMES);
-    print_message("largest change of a block in %d steps with births: %.2f grey levels, in %d without: %.2f\n",
-                  changes.births, changes.with, changes.calm, changes.without);
+    double most = (double)changes.all[changes.count - 1];
+    print_message(
+        "largest change of a block, mean of %d steps with births: %.2f grey levels, of %d without: %.2f; of all: "
+        "%.2f\n",
+        changes.births, changes.with, changes.calm, changes.without, most);
     assert_true(changes.births >= 10 && changes.calm >= 10);
     assert_true(changes.with <= 1.3 * changes.without);
+    // Fades as short as the strain leaves them come to 8 here.
+    assert_true(most <= 6);
     free(changes.all);
     scene_moments_free(&moments);
     rf_lagrangian_destroy(lagrangian);
@@ -386,7 +394,8 @@ static void in_strong_strain_no_part_of_the_picture_is_swapped_at_once(void **st
            rare = (double)changes.all[changes.count * 999 / 1000];
     print_message("median change of a block %.2f grey levels, of one in a thousand x%.2f, of the worst x%.2f\n", median,
                   rare / median, most / median);
-    assert_true(most <= 7 * median);
+    // Fades as short as the strain leaves them give 5.7 in a thousand.
+    assert_true(rare <= 5 * median && most <= 10 * median);
     free(changes.all);
     rf_lagrangian_destroy(lagrangian);
     rf_exemplar_destroy(exemplar);

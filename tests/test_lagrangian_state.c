@@ -316,7 +316,7 @@ static void options_out_of_range_are_refused_by_name(void **state)
     RfExemplar *exemplar = scene_noise_exemplar(64, 1);
     int count;
     const RfOption *table = rf_lagrangian_option_table(&count);
-    assert_int_equal(count, 10);
+    assert_int_equal(count, 11);
     for (int i = 0; i < count; ++i)
     {
         const float floats[] = {(float)table[i].minimum - 0.01f, (float)table[i].maximum * 1.01f, NAN, INFINITY,

@@ -28,6 +28,11 @@ typedef struct RfLagrangianOptions
     /// keeps the spectrum, larger follows longer.
     float max_distortion;
 
+    /// How fast a grid slips back to its rest shape, in units of the rate of strain round it, 0 to 1000. Default 1.5;
+    /// 0 never, as in the paper. In a steady strain a grid then settles at a stretch of exp(1 / relaxation) and lives on.
+    /// Larger keeps the spectrum and draws fewer layers, smaller follows the flow closer at the rim of a grid.
+    float relaxation;
+
     /// Longest time a grid takes to fade in or out (tau), in seconds, 0 to 1000. Default 5. Where the flow strains
     /// fast, fades are shorter.
     float fade;
@@ -54,7 +59,8 @@ typedef struct RfLagrangianOptions
 
 /// The best we found; docs/lagrangian.md shows how it was chosen.
 RF_API RfLagrangianOptions rf_lagrangian_defaults(void);
-/// The constants of the paper: delta_max 5, tau 5 s everywhere, linear kernel, random areas.
+/// The constants of the paper: delta_max 5, tau 5 s everywhere, linear kernel, random areas, no
+/// relaxation.
 RF_API RfLagrangianOptions rf_lagrangian_paper(void);
 /// Every field of the options but struct_size.
 RF_API const RfOption *rf_lagrangian_option_table(int *count);

@@ -37,6 +37,9 @@ static const RfOption option_table[] = {
     {"max-distortion", RF_OPTION_FLOAT, FIELD(max_distortion), "", 1.05, 100, 1.95, NULL,
      "Stretch or squash at which a texture is invisible. Smaller keeps the exemplar's look, larger follows the flow "
      "for longer."},
+    {"relaxation", RF_OPTION_FLOAT, FIELD(relaxation), "", 0, 1000, 1.5, NULL,
+     "How fast grids slip back to their rest shape, in units of the local rate of strain; 0 never. Larger keeps the "
+     "look, smaller follows closer."},
     {"fade", RF_OPTION_FLOAT, FIELD(fade), "s", 0, 1000, 5, NULL, "Longest time a grid takes to fade in or out."},
     {"adapt", RF_OPTION_FLOAT, FIELD(adapt), "", 0, 1, 1, NULL,
      "How far fades shorten where the flow strains: 0 not at all, 1 to end before the distortion limit."},
@@ -68,6 +71,7 @@ RfLagrangianOptions rf_lagrangian_defaults(void)
                                  .particle_radius = 0,
                                  .grid_vertices = 8,
                                  .max_distortion = 1.95f,
+                                 .relaxation = 1.5f,
                                  .fade = 5,
                                  .adapt = 1,
                                  .sharpness = 1.5f,
@@ -80,6 +84,7 @@ RfLagrangianOptions rf_lagrangian_paper(void)
 {
     RfLagrangianOptions options = rf_lagrangian_defaults();
     options.max_distortion = 5;
+    options.relaxation = 0;
     options.fade = 5;
     options.adapt = 0;
     options.sharpness = 1;

@@ -12,7 +12,7 @@
 
 enum
 {
-    VERSION = 2
+    VERSION = 3
 };
 
 static const char magic[8] = "RFLAGRAN";
