@@ -3,7 +3,7 @@
 BUILD := build
 FORMATTED = $(shell git ls-files '*.c' '*.h')
 
-.PHONY: all demo test bench curve gallery docs format install clean setup-% configure
+.PHONY: all demo test bench curve rivals evaluate gallery docs format install clean setup-% configure
 
 all: setup-build configure
 	@cmake --build $(BUILD) --target riffle riffle_static riffle_shared
@@ -31,6 +31,16 @@ bench: setup-test configure
 curve: setup-test configure
 	@cmake --build $(BUILD) --target bench_quality
 	@bash bench/curve.sh $(BUILD)/bench_quality
+
+# The same for the rivals' own parameters.
+rivals: setup-test configure
+	@cmake --build $(BUILD) --target bench_quality
+	@bash bench/rivals.sh $(BUILD)/bench_quality
+
+# Every method on every pair of flow and exemplar, judged: renews the tables and pictures of docs/evaluation.md. 20 minutes.
+evaluate: setup-demo configure
+	@cmake --build $(BUILD) --target evaluation_run evaluation_page contact_sheet
+	@bash evaluation/evaluate.sh $(BUILD)
 
 # Contact sheets of the real inputs ($$RIFFLE_DATA, else ../shared/data) and the built-in ones, in build/gallery.
 # "make gallery DOCS=1" also renews the pictures in docs/gallery, those of free inputs only; SHEETS="NAME..." picks some.

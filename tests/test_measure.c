@@ -478,7 +478,7 @@ static void the_option_table_has_the_defaults_and_every_option(void **state)
         assert_true(value == table[i].default_value);
         assert_true(table[i].minimum <= value && value <= table[i].maximum);
     }
-    assert_int_equal(count, 12);
+    assert_int_equal(count, 13);
 }
 
 static RfMeasureStatistic statistic(const RfMeasure *measure, const char *name)

@@ -65,6 +65,9 @@ typedef struct RfMeasureOptions
     /// Default 5. Three estimates each.
     int flow_every;
 
+    /// The flicker is computed at every n-th frame that has a predecessor, the first one included; 0 never. Default 1.
+    int flicker_every;
+
     /// The patch distance is computed at every n-th frame, the first one included; 0 never. Default 10. The
     /// costliest measure.
     int patch_every;

@@ -77,6 +77,8 @@ static const RfOption g_options[] = {
      "Who estimates the motion: as accurate as what published work measures with, or ten times finer."},
     {"flow-every", RF_OPTION_INT, offsetof(RfMeasureOptions, flow_every), "frames", 0, 1000000, 5, NULL,
      "The flow error is computed at every n-th frame; 0 never."},
+    {"flicker-every", RF_OPTION_INT, offsetof(RfMeasureOptions, flicker_every), "frames", 0, 1000000, 1, NULL,
+     "The flicker is computed at every n-th frame; 0 never."},
     {"patch-every", RF_OPTION_INT, offsetof(RfMeasureOptions, patch_every), "frames", 0, 1000000, 10, NULL,
      "The patch distance is computed at every n-th frame; 0 never."},
     {"patch-size", RF_OPTION_INT, offsetof(RfMeasureOptions, patch_size), "px", 3, 31, 9, NULL,
@@ -110,6 +112,7 @@ RfMeasureOptions rf_measure_defaults(void)
                               .seed = 7,
                               .estimator = RF_MEASURE_INVERSE_SEARCH,
                               .flow_every = 5,
+                              .flicker_every = 1,
                               .patch_every = 10,
                               .patch_size = 9,
                               .rotations = 1,
@@ -297,9 +300,17 @@ static RfResult take_frame(RfMeasure *m, const RfImageView *frame, Frame *now, R
 
 // ---- the measures ------------------------------------------------------------------------------------------------
 
+static bool is_due(const RfMeasure *m, int every)
+{
+    return every > 0 && m->pairs_seen % every == 0;
+}
+
 static RfResult judge_motion(RfMeasure *m, const RfFlowView *flow, const Frame *before, const Frame *now,
                              RfMeasureFrame *out)
 {
+    bool flicker = is_due(m, m->options.flicker_every), error = is_due(m, m->options.flow_every);
+    if (!flicker && !error)
+        return RF_OK;
     RfFramePair pair = {m->width,
                         m->height,
                         before->grey,
@@ -307,10 +318,11 @@ static RfResult judge_motion(RfMeasure *m, const RfFlowView *flow, const Frame *
                         before->all_known ? NULL : before->known,
                         now->all_known ? NULL : now->known};
     rf_measure_displacement(flow, m->timed ? m->time : flow->time - 1, m->width, m->height, m->displacement);
-    RF_TRY(rf_measure_flicker(&pair, m->displacement, m->maps[RF_MEASURE_MAP_FLICKER], m->maps[RF_MEASURE_MAP_BLOCKS],
-                              &out->flicker));
-    m->has_map[RF_MEASURE_MAP_FLICKER] = m->has_map[RF_MEASURE_MAP_BLOCKS] = true;
-    if (m->options.flow_every == 0 || m->pairs_seen % m->options.flow_every != 0)
+    if (flicker)
+        RF_TRY(rf_measure_flicker(&pair, m->displacement, m->maps[RF_MEASURE_MAP_FLICKER],
+                                  m->maps[RF_MEASURE_MAP_BLOCKS], &out->flicker));
+    m->has_map[RF_MEASURE_MAP_FLICKER] = m->has_map[RF_MEASURE_MAP_BLOCKS] = flicker;
+    if (!error)
         return RF_OK;
     RfGrey exemplar = {m->exemplar_grey, m->exemplar.width, m->exemplar.height};
     RF_TRY(rf_measure_flow_error(m->options.estimator, &pair, m->displacement, m->exemplar_grey ? &exemplar : NULL,
