@@ -16,14 +16,22 @@ rm -rf "$out"
 mkdir -p "$out" "$docs"
 
 # run NAME ARGUMENTS...: one part of the results, on one thread; as many at a time as there are processors.
+parts=()
 run() {
     local name=$1
     shift
-    while [ "$(jobs -rp | wc -l)" -ge "$(nproc)" ]; do wait -n; done
+    while [ "$(jobs -rp | wc -l)" -ge "$(nproc)" ]; do sleep 0.2; done
     "$build/evaluation_run" "$@" threads=1 > "$out/$name.csv" &
+    parts+=("$!")
 }
 
-# join NAME PART...: their lines under one header; what fails leaves no lines and stops here.
+# Waits for all parts; one that failed stops here.
+finish() {
+    local part
+    for part in "${parts[@]}"; do wait "$part"; done
+}
+
+# join NAME PART...: their lines under one header.
 join() {
     local name=$1 part
     shift
@@ -35,7 +43,7 @@ for flow in vortex turbulence cylinder wind; do run "main-$flow" main "flow=$flo
 for flow in vortex turbulence; do
     for exemplar in noise foam; do run "sweep-$flow-$exemplar" sweep frames=100 "flow=$flow" "exemplar=$exemplar"; done
 done
-wait
+finish
 join main main-{vortex,turbulence,cylinder,wind}
 join sweep sweep-{vortex,turbulence}-{noise,foam}
 "$build/evaluation_page" "$out/main.csv" "$out/sweep.csv" docs/evaluation.md "$docs"

@@ -95,7 +95,7 @@ static double badness(const char *name, double value)
             case RF_MEASURE_HIGHER_IS_BETTER:
                 return -value;
             case RF_MEASURE_ONE_IS_BEST:
-                return fabs(value - 1);
+                return fabs(log(value));
             case RF_MEASURE_ZERO_IS_BEST:
                 return fabs(value);
             default:
@@ -198,59 +198,68 @@ static Curve curve_of(const char *flow, const char *exemplar, const char *label)
     return c;
 }
 
-// Is some point of the curve, straight between its settings, no better than this one in either?
-static bool is_ahead(const Curve *c, double flow, double spectrum)
+static double mix(double a, double b, double t)
 {
-    for (int i = 0; i + 1 < c->count; ++i)
-        for (int k = 0; k <= STEPS; ++k)
-        {
-            double t = (double)k / STEPS, f = c->flow[i] + t * (c->flow[i + 1] - c->flow[i]),
-                   s = c->spectrum[i] + t * (c->spectrum[i + 1] - c->spectrum[i]);
-            if (flow <= f && spectrum <= s)
-                return true;
-        }
-    return false;
+    return a + t * (b - a);
 }
 
-static bool is_behind(const Curve *c, double flow, double spectrum)
+typedef enum Place
 {
-    for (int i = 0; i + 1 < c->count; ++i)
-        for (int k = 0; k <= STEPS; ++k)
-        {
-            double t = (double)k / STEPS;
-            if (c->flow[i] + t * (c->flow[i + 1] - c->flow[i]) <= flow &&
-                c->spectrum[i] + t * (c->spectrum[i + 1] - c->spectrum[i]) <= spectrum)
-                return true;
-        }
-    return false;
+    BEHIND, // a point of a curve of ours is at least as good in both
+    AHEAD,  // it is at least as good in both as a point of a curve of ours, and not behind
+    BEYOND  // neither: past the ends of our curves
+} Place;
+
+// Curves are straight between their settings.
+static Place place_of(const Curve *curves, int count, double flow, double spectrum)
+{
+    Place place = BEYOND;
+    for (int c = 0; c < count; ++c)
+        for (int i = 0; i + 1 < curves[c].count; ++i)
+            for (int k = 0; k <= STEPS; ++k)
+            {
+                double t = (double)k / STEPS;
+                double f = mix(curves[c].flow[i], curves[c].flow[i + 1], t);
+                double s = mix(curves[c].spectrum[i], curves[c].spectrum[i + 1], t);
+                if (f <= flow && s <= spectrum)
+                    return BEHIND;
+                if (flow <= f && spectrum <= s)
+                    place = AHEAD;
+            }
+    return place;
+}
+
+static bool is_ours(const char *label)
+{
+    return strncmp(label, "lagrangian", 10) == 0;
 }
 
 static void print_points(FILE *out)
 {
     const char *labels[MAX_NAMES];
     int count = list_labels(&sweep, labels);
-    fprintf(out, "| flow | exemplar | method | points | behind the curve | ahead of it | beyond its ends |\n"
+    fprintf(out, "| flow | exemplar | method | points | behind | ahead | beyond the ends |\n"
                  "| --- | --- | --- | --- | --- | --- | --- |\n");
     for (int i = 0; i < sweep.count; ++i)
     {
         const Row *row = &sweep.rows[i];
         if (i > 0 && strcmp(row->flow, row[-1].flow) == 0 && strcmp(row->exemplar, row[-1].exemplar) == 0)
             continue;
-        Curve ours = curve_of(row->flow, row->exemplar, "lagrangian fine");
+        static Curve ours[MAX_NAMES];
+        int our_count = 0;
+        for (int k = 0; k < count; ++k)
+            if (is_ours(labels[k]))
+                ours[our_count++] = curve_of(row->flow, row->exemplar, labels[k]);
         for (int k = 0; k < count; ++k)
         {
-            if (strncmp(labels[k], "lagrangian", 10) == 0)
+            if (is_ours(labels[k]))
                 continue;
             Curve theirs = curve_of(row->flow, row->exemplar, labels[k]);
-            int behind = 0, ahead = 0;
+            int places[3] = {0};
             for (int p = 0; p < theirs.count; ++p)
-            {
-                bool before = is_ahead(&ours, theirs.flow[p], theirs.spectrum[p]);
-                ahead += before;
-                behind += !before && is_behind(&ours, theirs.flow[p], theirs.spectrum[p]);
-            }
+                ++places[place_of(ours, our_count, theirs.flow[p], theirs.spectrum[p])];
             fprintf(out, "| %s | %s | %s | %d | %d | %d | %d |\n", row->flow, row->exemplar, labels[k], theirs.count,
-                    behind, ahead, theirs.count - behind - ahead);
+                    places[BEHIND], places[AHEAD], places[BEYOND]);
         }
     }
 }
@@ -313,10 +322,10 @@ static void draw_axes(FILE *out, const Axes *a, const char *title)
 
 static void draw_curve(FILE *out, const Axes *a, const Curve *c, const char *label, int index)
 {
-    static const char *const colours[] = {"#d1242f", "#0969da", "#1a7f37", "#9a6700",
-                                          "#8250df", "#57606a", "#bf3989", "#1b7c83"};
-    const char *colour = colours[index % 8];
-    fprintf(out, "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"%d\" points=\"", colour, index == 0 ? 3 : 2);
+    static const char *const colours[] = {"#d1242f", "#0969da", "#1a7f37", "#9a6700", "#8250df",
+                                          "#57606a", "#bf3989", "#1b7c83", "#bc4c00", "#4d2d00"};
+    const char *colour = colours[index % 10];
+    fprintf(out, "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"%d\" points=\"", colour, is_ours(label) ? 3 : 1);
     for (int p = 0; p < c->count; ++p)
         fprintf(out, "%.1f,%.1f ", plot_x(a, c->flow[p]), plot_y(a, c->spectrum[p]));
     fprintf(out, "\"/>\n");

@@ -12,7 +12,7 @@
 //
 // Columns: set, flow, exemplar, label, parameter, value, ms a frame, then the mean of each quantity of
 // rf_measure_quantity_table. Flow error is taken at every 11th frame, patch distance at every
-// tenth, flicker at every third, the rest at every one.
+// tenth, flicker at every third, the rest at every one; a sweep leaves patch distance and flicker out.
 
 #include "riffle/riffle.h"
 #include "support/steppers.h"
@@ -63,19 +63,28 @@ typedef struct MethodCase
     // The parameter that is swept, and its values.
     const char *parameter;
     double values[MAX_VALUES];
+    // Another curve of a method that has its column already.
+    bool sweep_only;
 } MethodCase;
 
 // Particles at an eighth of the frame's side, and at a sixteenth with the relaxation that suits it.
 static const MethodCase methods[] = {
-    {"lagrangian", "lagrangian", "particle-radius=32", "relaxation", {0.3, 1.5, 3, 6, 12}},
-    {"lagrangian fine", "lagrangian", "particle-radius=16 relaxation=7", "relaxation", {0.3, 1.5, 3, 7, 15, 40}},
-    {"eulerian", "eulerian", "", "latency", {6, 12, 24, 48}},
-    {"eulerian short", "eulerian", "layers=1 latency=12", "latency", {8, 12, 16, 24, 48}},
-    {"eulerian long", "eulerian", "layers=1 latency=96", NULL, {0}},
-    {"dual", "dual", "", "reset-every", {8, 12, 16, 24, 32, 48, 96}},
-    {"dual plain", "dual", "blend=0 scatter=0", "reset-every", {8, 12, 16, 24, 32, 48, 96}},
-    {"sprites", "sprites", "", "particle-radius", {12, 16, 20, 24, 32, 48}},
-    {"warp", "warp", "", NULL, {0}},
+    {"lagrangian", "lagrangian", "particle-radius=32", "relaxation", {0.3, 1.5, 3, 6, 12}, false},
+    {"lagrangian fine", "lagrangian", "particle-radius=16 relaxation=7", "relaxation", {0.3, 1.5, 3, 7, 15, 40}, false},
+    {"lagrangian radius", "lagrangian", "relaxation=7", "particle-radius", {10, 12, 16, 24}, true},
+    {"lagrangian distortion",
+     "lagrangian",
+     "particle-radius=16 relaxation=7",
+     "max-distortion",
+     {1.6, 2.6, 3.5, 5},
+     true},
+    {"eulerian", "eulerian", "", "latency", {6, 12, 24, 48}, false},
+    {"eulerian short", "eulerian", "layers=1 latency=12", "latency", {8, 12, 16, 24, 48}, false},
+    {"eulerian long", "eulerian", "layers=1 latency=96", NULL, {0}, false},
+    {"dual", "dual", "", "reset-every", {8, 12, 16, 24, 32, 48, 96}, false},
+    {"dual plain", "dual", "blend=0 scatter=0", "reset-every", {8, 12, 16, 24, 32, 48, 96}, false},
+    {"sprites", "sprites", "", "particle-radius", {12, 16, 20, 24, 32, 48}, false},
+    {"warp", "warp", "", NULL, {0}, false},
 };
 
 enum
@@ -294,7 +303,7 @@ static void run_methods(Run *run)
     {
         run->method = &methods[m];
         run->value = NAN;
-        if (!wanted(run->settings->method, methods[m].label))
+        if (!wanted(run->settings->method, methods[m].label) || (methods[m].sweep_only && !run->settings->sweep))
             continue;
         if (!run->settings->sweep)
             run_one(run);

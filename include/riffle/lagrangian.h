@@ -85,7 +85,7 @@ RF_API RF_MUST_USE RfResult rf_lagrangian_create(const RfExemplar *exemplar, con
 
 /// Moves to `flow->time` and draws the frame, which must have the exemplar's channels and, after the first step, its
 /// old size. The first step only places grids. Times must not decrease. Pixels outside the fluid become 0. On failure
-/// `frame` holds its old pixels.
+/// `frame` holds its old pixels; after RF_OUT_OF_MEMORY the stepper is good for destroying only.
 RF_API RF_MUST_USE RfResult rf_lagrangian_step(RfLagrangian *lagrangian, const RfFlowView *flow,
                                                const RfImageView *frame);
 
