@@ -43,15 +43,7 @@ static RfEulerianOptions options_of(int latency, int layers)
 // How much longer than high the texture's features are on the right.
 static double elongation(const float *pixels)
 {
-    double along = 0, across = 0;
-    for (int y = 20; y < N - 20; ++y)
-        for (int x = N / 2 + 12; x < N - 12; ++x)
-        {
-            const float *p = pixels + 3 * (y * N + x);
-            along += (double)((p[3] - p[-3]) * (p[3] - p[-3]));
-            across += (double)((p[3 * N] - p[-3 * N]) * (p[3 * N] - p[-3 * N]));
-        }
-    return sqrt(across / along);
+    return scene_elongation(pixels, N, N / 2 + 12, 20, N - 12, N - 20);
 }
 
 static float largest_change_on_the_left(void)

@@ -373,6 +373,16 @@ static void a_copy_of_a_window_is_found_at_distance_zero(void **state)
     close_scene(&s);
 }
 
+// Whether two windows of one channel are the same wherever the query knows its pixels.
+static bool looks_alike(const Scene *s, int q, const float *a, const float *b)
+{
+    int pixels = s->side * s->side;
+    for (int p = 0; p < pixels; ++p)
+        if ((!s->known || s->mask[q * pixels + p] > 0) && a[p] != b[p])
+            return false;
+    return true;
+}
+
 static void of_equal_candidates_the_lower_wins(void **state)
 {
     (void)state;
@@ -393,7 +403,7 @@ static void of_equal_candidates_the_lower_wins(void **state)
                 float own[81], best[81];
                 rf_windows_read(s.database, i, own);
                 rf_windows_read(s.database, matches[q].candidate, best);
-                assert_true(memcmp(own, best, sizeof own) != 0 || known);
+                assert_false(looks_alike(&s, q, own, best));
             }
         close_scene(&s);
     }
@@ -517,12 +527,29 @@ static char *matches_with(const char *set)
 static void every_instruction_set_finds_the_same(void **state)
 {
     (void)state;
-    char *plain = matches_with("plain"), *avx2 = matches_with("avx2"), *avx512 = matches_with("avx512");
-    assert_string_equal(plain, avx2);
-    assert_string_equal(plain, avx512);
+    static const struct
+    {
+        RfSimdLevel level;
+        const char *name;
+    } sets[] = {{RF_SIMD_AVX2, "avx2"}, {RF_SIMD_AVX512, "avx512"}};
+    if (rf_simd_level() == RF_SIMD_PLAIN)
+    {
+        print_message("skipped: this machine has the plain instruction set only\n");
+        skip();
+    }
+    char *plain = matches_with("plain");
+    for (int i = 0; i < 2; ++i)
+    {
+        if (rf_simd_level() < sets[i].level)
+        {
+            print_message("%s skipped: this machine does not have it\n", sets[i].name);
+            continue;
+        }
+        char *wide = matches_with(sets[i].name);
+        assert_string_equal(plain, wide);
+        free(wide);
+    }
     free(plain);
-    free(avx2);
-    free(avx512);
 }
 
 static void windows_are_read_and_gathered_alike(void **state)

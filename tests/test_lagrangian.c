@@ -196,6 +196,38 @@ static void pixels_on_land_are_zero(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
+static void a_step_of_no_length_in_which_the_mask_grows_leaves_no_hole(void **state)
+{
+    (void)state;
+    enum
+    {
+        N = 96
+    };
+    static uint8_t mask[N * N];
+    RfExemplar *exemplar = scene_noise_exemplar(64, 1);
+    SceneMoments moments = scene_moments(scene_two_vortices, N, N);
+    RfImageView frame = view_of(g_frame, N, N, 3);
+    for (int edge = 10; edge < 40; edge += 3)
+    {
+        RfLagrangian *lagrangian = make(exemplar, options_of(12, RF_BLEND_CONTRAST));
+        RfFlowView view = scene_step(&moments, 1);
+        view.mask = mask;
+        for (int grown = 0; grown < 3; ++grown)
+        {
+            for (int k = 0; k < N * N; ++k)
+                mask[k] = k % N < edge + 20 * grown;
+            assert_int_equal(rf_lagrangian_step(lagrangian, &view, &frame), RF_OK);
+            assert_int_equal(rf_lagrangian_stats(lagrangian).holes, 0);
+            assert_true(rf_lagrangian_stats(lagrangian).born > 0);
+            for (int k = 0; k < N * N; ++k)
+                assert_true(mask[k] ? g_frame[3 * k] > 0.02f : g_frame[3 * k] == 0);
+        }
+        rf_lagrangian_destroy(lagrangian);
+    }
+    scene_moments_free(&moments);
+    rf_exemplar_destroy(exemplar);
+}
+
 // ---- weights
 
 // A smooth picture known everywhere: mean 0, one cycle in 64 pixels.
@@ -654,6 +686,7 @@ int main(void)
         cmocka_unit_test(a_constant_exemplar_gives_a_constant_frame_however_it_is_blended),
         cmocka_unit_test(three_hundred_frames_have_no_hole_and_stay_maximal_without_crowds),
         cmocka_unit_test(pixels_on_land_are_zero),
+        cmocka_unit_test(a_step_of_no_length_in_which_the_mask_grows_leaves_no_hole),
         cmocka_unit_test(weights_sum_to_one_or_their_squares_do_and_the_frame_is_what_its_layers_say),
         cmocka_unit_test(a_birth_is_not_seen),
         cmocka_unit_test(in_strong_strain_no_part_of_the_picture_is_swapped_at_once),

@@ -124,19 +124,6 @@ static void sheared(int w, int h, double frame, float *velocity)
         }
 }
 
-static double elongation(const float *pixels)
-{
-    double along = 0, across = 0;
-    for (int y = 2; y < N - 2; ++y)
-        for (int x = 2; x < N - 2; ++x)
-        {
-            const float *p = pixels + 3 * (y * N + x);
-            along += (double)((p[3] - p[-3]) * (p[3] - p[-3]));
-            across += (double)((p[3 * N] - p[-3 * N]) * (p[3 * N] - p[-3 * N]));
-        }
-    return sqrt(across / along);
-}
-
 static void a_shear_does_not_stretch_them(void **state)
 {
     (void)state;
@@ -144,7 +131,8 @@ static void a_shear_does_not_stretch_them(void **state)
     RfSprites *sprites = make(exemplar, true);
     run(sprites, sheared, 0, 50);
     // A texture that follows is sheared by 3: 3.3 times longer than wide.
-    assert_true(elongation(g_last) > 0.85 && elongation(g_last) < 1.2);
+    double elongation = scene_elongation(g_last, N, 2, 2, N - 2, N - 2);
+    assert_true(elongation > 0.85 && elongation < 1.2);
     rf_sprites_destroy(sprites);
     rf_exemplar_destroy(exemplar);
 }

@@ -29,8 +29,8 @@ typedef struct RfLagrangianOptions
     float max_distortion;
 
     /// How fast a grid slips back to its rest shape, in units of the rate of strain round it, 0 to 1000. Default 1.5;
-    /// 0 never, as in the paper. In a steady strain a grid then settles at a stretch of exp(1 / relaxation) and lives on.
-    /// Larger keeps the spectrum and draws fewer layers, smaller follows the flow closer at the rim of a grid.
+    /// 0 never, as in the paper. In a steady strain a grid then settles at a stretch of exp(1 / relaxation) and lives
+    /// on. Larger keeps the spectrum and draws fewer layers, smaller follows the flow closer at the rim of a grid.
     float relaxation;
 
     /// Longest time a grid takes to fade in or out (tau), in seconds, 0 to 1000. Default 5. Where the flow strains
@@ -38,7 +38,8 @@ typedef struct RfLagrangianOptions
     float fade;
 
     /// How far fades follow the local strain, 0 to 1. Default 1. 0 fades everything over `fade`, 1 ends a fade before
-    /// the distortion reaches its limit.
+    /// the distortion reaches its limit. Whatever it is, a grid born where next to nothing else shows comes in over
+    /// half a second (or `fade`, if that is less).
     float adapt;
 
     /// Power of the kernel weight K_p, 0.25 to 12. Default 1.5. 1 is the paper's; larger keeps shapes by drawing one
@@ -59,8 +60,8 @@ typedef struct RfLagrangianOptions
 
 /// The best we found; docs/lagrangian.md shows how it was chosen.
 RF_API RfLagrangianOptions rf_lagrangian_defaults(void);
-/// The constants of the paper: delta_max 5, tau 5 s everywhere, linear kernel, random areas, no
-/// relaxation.
+/// The constants of the paper: delta_max 5, tau 5 s everywhere (but half a second for grids born where next to nothing
+/// else shows), linear kernel, random areas, no relaxation.
 RF_API RfLagrangianOptions rf_lagrangian_paper(void);
 /// Every field of the options but struct_size.
 RF_API const RfOption *rf_lagrangian_option_table(int *count);

@@ -45,6 +45,12 @@ static inline float rf_lerp(float a, float b, float t)
     return a + t * (b - a);
 }
 
+/// With the weights of Rec. 709.
+static inline float rf_luma(float r, float g, float b)
+{
+    return 0.2126f * r + 0.7152f * g + 0.0722f * b;
+}
+
 /// x modulo n in 0 .. n - 1, for negative x too.
 static inline int rf_wrap_int(int x, int n)
 {

@@ -19,6 +19,18 @@ RfSimdLevel rf_simd_level(void);
 
 #define RF_WIDE_BODY static inline __attribute__((always_inline))
 
+enum
+{
+    /// Of the widest vector. Arrays are padded to it, so that no loop has a rest.
+    RF_WIDE_FLOATS = 16
+};
+
+/// Loops run over whole vectors: to here, where they would run to `end`.
+RF_WIDE_BODY int rf_whole_vectors(int end)
+{
+    return (end + RF_WIDE_FLOATS - 1) / RF_WIDE_FLOATS * RF_WIDE_FLOATS;
+}
+
 #if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
 #define RF_WIDE(name, parameters, arguments)                                                                           \
     static void name##_plain parameters                                                                                \

@@ -45,16 +45,15 @@ enum
 {
     MAX_TAPS = 4,
     COARSE_STEP = 4,
-    WIDE = 16,
     TILE_PIXELS = RF_TILE_ROWS * RF_TILE_COLUMNS
 };
 
 RfResult rf_tile_create(int quads, int rows, RfArena *arena, RfTileSums *out)
 {
     out->colour = rf_arena_push(arena, (size_t)quads * TILE_PIXELS * 4, sizeof(float));
-    out->weight = rf_arena_push(arena, TILE_PIXELS + WIDE, sizeof(float));
-    out->weight2 = rf_arena_push(arena, TILE_PIXELS + WIDE, sizeof(float));
-    out->level = rf_arena_push(arena, TILE_PIXELS + WIDE, sizeof(float));
+    out->weight = rf_arena_push(arena, TILE_PIXELS + RF_WIDE_FLOATS, sizeof(float));
+    out->weight2 = rf_arena_push(arena, TILE_PIXELS + RF_WIDE_FLOATS, sizeof(float));
+    out->level = rf_arena_push(arena, TILE_PIXELS + RF_WIDE_FLOATS, sizeof(float));
     out->planes = rf_arena_push(arena, 1, sizeof *out->planes);
     if (!out->colour || !out->weight || !out->weight2 || !out->level || !out->planes)
         return RF_OUT_OF_MEMORY;
@@ -93,13 +92,7 @@ typedef struct Row
     int index[RF_TILE_PITCH];
 } Row;
 
-// Loops run over whole vectors: to here, where they would run to `end`.
-RF_WIDE_BODY int whole_vectors(int end)
-{
-    return (end + WIDE - 1) / WIDE * WIDE;
-}
-
-// ---- weighing
+// ---- weighing ----------------------------------------------------------------------------------------------------
 
 // log2 and exp2 to about 1e-4, in operations that go wide: only weights are made of them.
 RF_WIDE_BODY float fast_log2(float x)
@@ -162,9 +155,9 @@ RF_WIDE_BODY void weigh_row_with(const RfRasterArea *area, const RfDrawGrid *gri
     float cx = (grid->centre.x - area->origin.x) / area->spacing, inverse_radius = area->spacing / grid->radius;
     float dy = (((float)y + 0.5f) * area->row_spacing + area->origin.y - grid->centre.y) / area->spacing;
     float dy2 = dy * dy, fade = grid->fade;
-    const int stop = whole_vectors(end);
+    const int stop = rf_whole_vectors(end);
 #pragma omp simd
-    for (int k = first / WIDE * WIDE; k < stop; ++k)
+    for (int k = first / RF_WIDE_FLOATS * RF_WIDE_FLOATS; k < stop; ++k)
     {
         float dx = (float)k + 0.5f - cx;
         float kernel = rf_max(1 - fast_root(dx * dx + dy2) * inverse_radius, 0);
@@ -185,7 +178,7 @@ RF_WIDE_BODY void weigh_row(const RfRasterArea *area, const RfDrawGrid *grid, fl
         weigh_row_with(area, grid, sharpness, y, first, end, 0, weight);
 }
 
-// ---- rows between
+// ---- rows between ------------------------------------------------------------------------------------------------
 
 // Where u, v and w of a grid are taken: at every step-th row of the tile.
 typedef struct Rows
@@ -265,9 +258,9 @@ RF_WIDE_BODY bool take_row(const Rows *rows, const RfRasterPlanes *planes, const
     const float *restrict w0 = planes->weight + upper, *restrict w1 = planes->weight + lower;
     float *restrict u = row->u, *restrict v = row->v, *restrict weight = row->weight;
     int first = RF_TILE_COLUMNS, last = -1;
-    const int stop = whole_vectors(end);
+    const int stop = rf_whole_vectors(end);
 #pragma omp simd reduction(min : first) reduction(max : last)
-    for (int k = start / WIDE * WIDE; k < stop; ++k)
+    for (int k = start / RF_WIDE_FLOATS * RF_WIDE_FLOATS; k < stop; ++k)
     {
         float w = w0[k] + t * (w1[k] - w0[k]);
         bool shows = w > NEGLIGIBLE * others[k];
@@ -282,7 +275,7 @@ RF_WIDE_BODY bool take_row(const Rows *rows, const RfRasterPlanes *planes, const
     return first <= last;
 }
 
-// ---- sampling
+// ---- sampling ----------------------------------------------------------------------------------------------------
 
 // Exemplar pixels that a frame pixel covers, along both axes of its footprint, and what they ask of the sampler.
 RF_WIDE_BODY Filter choose_filter(const RfDrawJob *job, const RfDrawGrid *grid)
@@ -331,9 +324,9 @@ RF_WIDE_BODY void find_texels(const RfTextureLevel *level, bool tiles, RfVec2 sh
     const float *restrict u = row->u, *restrict v = row->v, *restrict weight = row->weight;
     float *restrict left = row->left, *restrict right = row->right, *restrict fy = row->fy;
     int *restrict index = row->index;
-    const int stop = whole_vectors(row->end);
+    const int stop = rf_whole_vectors(row->end);
 #pragma omp simd
-    for (int k = row->first / WIDE * WIDE; k < stop; ++k)
+    for (int k = row->first / RF_WIDE_FLOATS * RF_WIDE_FLOATS; k < stop; ++k)
     {
         float s = u[k] * scale_x + shift_x, t = v[k] * scale_y + shift_y;
         s -= width * floorf(s * inverse_width);
@@ -406,9 +399,9 @@ RF_WIDE_BODY void sum_row(const RfDrawJob *job, const RfDrawGrid *grid, const Fi
                     *restrict levels = sums->level + place;
     const float *restrict weight = row->weight;
     float level_number = (float)filter->level;
-    const int stop = whole_vectors(row->end);
+    const int stop = rf_whole_vectors(row->end);
 #pragma omp simd
-    for (int k = row->first / WIDE * WIDE; k < stop; ++k)
+    for (int k = row->first / RF_WIDE_FLOATS * RF_WIDE_FLOATS; k < stop; ++k)
     {
         w1[k] += weight[k];
         w2[k] += weight[k] * weight[k];
@@ -450,7 +443,7 @@ RF_WIDE(rf_tile_draw,
         (const RfDrawJob *job, const RfDrawGrid *grid, RfTileSums *sums, float *lattice, int64_t *samples),
         (job, grid, sums, lattice, samples))
 
-// ---- layers
+// ---- layers ------------------------------------------------------------------------------------------------------
 
 RF_WIDE_BODY void insert_layer(RfTileLayer *layer, float u, float v, float weight, uint32_t id)
 {

@@ -174,6 +174,9 @@ static RfResult place(RfCoordinates *c, int width, int height)
     {
         rf_release(offset);
         rf_release(next);
+        // The next try may be of another size.
+        rf_release(c->nearest);
+        c->nearest = NULL;
         return RF_OUT_OF_MEMORY;
     }
     c->offset = offset;
@@ -307,7 +310,8 @@ static RfResult check_state(const StateHeader *header, int sets, const char *mag
         return rf_fail(RF_BAD_INPUT, NULL, "header", "saved with another exemplar or other options: start again");
     bool empty = header->width == 0 && header->height == 0;
     bool sized = header->width >= 1 && header->width <= RF_MAX_SIZE && header->height >= 1 &&
-                 header->height <= RF_MAX_SIZE && isfinite(header->start) && isfinite(header->time);
+                 header->height <= RF_MAX_SIZE && isfinite(header->start) && isfinite(header->time) &&
+                 header->start <= header->time;
     uint64_t offsets = 2 * sizeof(float) * (uint64_t)(uint32_t)sets * (uint64_t)(uint32_t)header->width *
                        (uint64_t)(uint32_t)header->height;
     if (header->sets != sets || (!empty && !sized) || size - sizeof *header != offsets ||

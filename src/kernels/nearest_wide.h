@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The loops of nearest.c for one instruction set. Included once for each, with
 //
-//   SET(name)          the name's form for this set
-//   TARGET             the attribute that turns the set on
-//   WIDTH, Vector      floats in a vector, and its type (any float's alignment will do)
-//   ROWS               queries of a tile in one go: 2 * ROWS sums, 2 numbers of a candidate, 1 of a query fit the
-//   registers LEAST(a, b)        the lesser, number by number BELOW(a, limit)    bit i: a[i] <= limit[i]
+// SET(name): the name's form for this set.
+//
+// TARGET: the attribute that turns the set on.
+//
+// WIDTH, Vector: floats in a vector, and its type (any float's alignment will do).
+//
+// ROWS: queries of a tile in one go: 2 * ROWS sums, 2 numbers of a candidate, 1 of a query fit the registers.
+//
+// LEAST(a, b): the lesser, number by number.
+//
+// BELOW(a, limit): bit i: a[i] <= limit[i].
 
 TARGET static inline __attribute__((always_inline)) void SET(tile_piece)(const float *queries, const float *candidates,
                                                                          int numbers, const float *start, float *out,

@@ -25,7 +25,7 @@ enum
 typedef struct RfWindowSource
 {
     RfImageView image;
-    /// [height][width], 0: not valid. NULL: all are. A pixel with a number that is not finite, or beyond +-1e15, is
+    /// [height][width], 0: not valid. NULL: all are. A pixel with a number that is not finite, or beyond +-1e12, is
     /// never valid. Only windows that lie wholly in valid pixels count.
     const uint8_t *valid;
     /// 6 floats a, b, c, d, e, f: pixel (x, y) here shows what lies at (a x + b y + c, d x + e y + f) in the exemplar.

@@ -18,11 +18,6 @@ typedef float Vec4 __attribute__((vector_size(16), aligned(4), may_alias));
 // Points.
 #define FARTHEST 1e6f
 
-enum
-{
-    WIDE = 16
-};
-
 // The part of the area that the kernel's circle can reach, in points.
 typedef struct Region
 {
@@ -95,18 +90,12 @@ RF_WIDE_BODY bool is_above(const Corner *p, const Corner *q)
     return p->y < q->y || (p->y == q->y && p->x < q->x);
 }
 
-// Loops run over whole vectors: to here, where they would run to `end`.
-RF_WIDE_BODY int whole_vectors(int end)
-{
-    return (end + WIDE - 1) / WIDE * WIDE;
-}
-
 // Writes `count` pixels; u0, v0, w0 are the values at the first and dx their slopes along x.
 RF_WIDE_BODY void write_pixels(RfRasterPlanes *planes, int place, int count, float u0, float v0, float w0, Vec4 dx)
 {
     float *restrict u = planes->u + place, *restrict v = planes->v + place, *restrict weight = planes->weight + place;
     float du = dx[0], dv = dx[1], dw = dx[2];
-    const int stop = whole_vectors(count);
+    const int stop = rf_whole_vectors(count);
 #pragma omp simd
     for (int k = 0; k < stop; ++k)
     {
@@ -128,9 +117,9 @@ RF_WIDE_BODY float slope_of(const Corner *p, const Corner *q)
 // Pixels of a triangle's rows: [first, end), end <= first where there are none; and the values there.
 typedef struct TriangleRows
 {
-    int first[RF_TILE_ROWS + WIDE], end[RF_TILE_ROWS + WIDE];
+    int first[RF_TILE_ROWS + RF_WIDE_FLOATS], end[RF_TILE_ROWS + RF_WIDE_FLOATS];
     // At the first pixel.
-    float u[RF_TILE_ROWS + WIDE], v[RF_TILE_ROWS + WIDE], weight[RF_TILE_ROWS + WIDE];
+    float u[RF_TILE_ROWS + RF_WIDE_FLOATS], v[RF_TILE_ROWS + RF_WIDE_FLOATS], weight[RF_TILE_ROWS + RF_WIDE_FLOATS];
 } TriangleRows;
 
 // All rows of the triangle a, b, c (from top to bottom) at once.
@@ -144,7 +133,7 @@ RF_WIDE_BODY void find_rows(const Region *region, const Corner *a, const Corner 
           dyw = dy[2];
     int count = end_row - first_row;
     int *restrict least = extent->first + first_row, *restrict most = extent->end + first_row;
-    const int stop = whole_vectors(count);
+    const int stop = rf_whole_vectors(count);
 #pragma omp simd
     for (int k = 0; k < stop; ++k)
     {

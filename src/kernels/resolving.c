@@ -50,15 +50,11 @@ RF_WIDE(rf_resolve_scales,
          float *inverse_norm),
         (weight, weight2, rho, count, inverse_sum, inverse_norm))
 
-RF_WIDE_BODY float luma_of(const float *c)
-{
-    return 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
-}
-
 // How much brighter the contrast-preserving blend is than the plain one; 1 where that means nothing.
 RF_WIDE_BODY float luma_ratio(const float *colour, float middle, float inverse_sum, float inverse_norm)
 {
-    float sum = luma_of(colour), plain = middle + sum * inverse_sum, wanted = middle + sum * inverse_norm;
+    float sum = rf_luma(colour[0], colour[1], colour[2]), plain = middle + sum * inverse_sum,
+          wanted = middle + sum * inverse_norm;
     float ratio = rf_min(rf_max(wanted / rf_max(plain, 1e-3f), 0), 4);
     return plain > 1e-3f ? ratio : 1;
 }
@@ -69,8 +65,9 @@ RF_WIDE_BODY void rf_resolve_row_body(const float *restrict colour, const float 
 {
     for (int k = 0; k < count; ++k)
     {
-        float ratio =
-            quad->colour ? luma_ratio(colour + 4 * k, luma_of(quad->mean), inverse_sum[k], inverse_norm[k]) : 1;
+        float ratio = quad->colour ? luma_ratio(colour + 4 * k, rf_luma(quad->mean[0], quad->mean[1], quad->mean[2]),
+                                                inverse_sum[k], inverse_norm[k])
+                                   : 1;
         for (int c = 0; c < 4; ++c)
         {
             bool plain = quad->plain[c] > 0 || (quad->colour && c < 3);
@@ -101,7 +98,7 @@ RF_WIDE_BODY void rf_resolve_rgb_body(const float *restrict colour, const float 
 {
     Vec4 mean = *(const Vec4 *)quad->mean, low = *(const Vec4 *)quad->low, high = *(const Vec4 *)quad->high;
     float ratio[RF_TILE_COLUMNS];
-    float middle = luma_of(quad->mean);
+    float middle = rf_luma(quad->mean[0], quad->mean[1], quad->mean[2]);
 #pragma omp simd
     for (int k = 0; k < count; ++k)
         ratio[k] = luma_ratio(colour + 4 * k, middle, inverse_sum[k], inverse_norm[k]);

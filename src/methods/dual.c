@@ -4,9 +4,9 @@
 // Max, Becker. Flow visualization using moving textures. 1995.
 // Vlachos. Water flow in Portal 2. SIGGRAPH course, 2010 (flow maps).
 //
-// A set's weight rises and falls as a triangle over its period, 0 at its reset, where the other one's is 1: the jump is
-// never seen. Deviation from most tools: the phases are whole frames, so that a weight is exactly 0 in the frame of a
-// reset, whatever the period.
+// A set's weight rises and falls as a triangle over its period, 0 at its reset, where the other one's is 1 (nearly 1 if
+// the period is odd): the jump is never seen. Deviation from most tools: the phases are whole frames, so that a weight
+// is exactly 0 in the frame of a reset, whatever the period.
 #include "riffle/dual.h"
 
 #include "core/memory.h"

@@ -25,8 +25,7 @@
 //
 // The rate is taken on a lattice of every eighth pixel and smoothed: deformation lies in filaments as thin as the
 // texture's features, and weights that vary as fast draw patterns of their own. Tried and dropped: to compare each
-// layer's own deformation with the limit, pixel by pixel. It pulses with the layer's phases, and the mix with it (half
-// again as much flicker).
+// layer's own deformation with the limit, pixel by pixel. It pulses with the layer's phases, and the mix with it.
 //
 // Deviations: the paper interpolates parameters of procedural noise to keep its contrast; pictures here are blended by
 // the contrast-preserving form. Small-scale animation, its third part, is no matter of following a given flow.

@@ -23,6 +23,7 @@
 // convolution. 1997), and the wheel's colour tints the grey a little, so that direction can be read too.
 #include "render/flow_picture.h"
 
+#include "core/maths.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/progress.h"
@@ -326,7 +327,7 @@ static void colour_band(void *context, int item, int worker)
             float grey = 0.50f + 0.34f * thread + 0.06f * sqrtf(share);
             // The wheel at equal luma: only its hue is wanted here.
             RfColour hue = rf_flow_colour(v, canvas->full_speed);
-            float luma = 0.2126f * hue.r + 0.7152f * hue.g + 0.0722f * hue.b;
+            float luma = rf_luma(hue.r, hue.g, hue.b);
             RfColour tinted = rf_colour_scale(hue, 0.35f + 0.65f / fmaxf(luma, 0.25f));
             RfColour colour = rf_colour_mix((RfColour){1, 1, 1}, tinted, 0.24f);
             rf_colour_put(canvas->frame, x, y, canvas->fluid[k] ? displayable(rf_colour_scale(colour, grey)) : RF_LAND);

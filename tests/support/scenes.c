@@ -135,6 +135,19 @@ void scene_noise(int w, int h, float low, float high, uint64_t seed, float *grey
     rf_release(spectrum);
 }
 
+double scene_elongation(const float *pixels, int stride, int x0, int y0, int x1, int y1)
+{
+    double along = 0, across = 0;
+    for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x)
+        {
+            const float *p = pixels + 3 * (y * stride + x), *above = p - 3 * stride, *below = p + 3 * stride;
+            along += (double)((p[3] - p[-3]) * (p[3] - p[-3]));
+            across += (double)((*below - *above) * (*below - *above));
+        }
+    return sqrt(across / along);
+}
+
 RfExemplar *scene_noise_exemplar(int size, uint64_t seed)
 {
     size_t count = (size_t)size * (size_t)size;

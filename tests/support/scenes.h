@@ -34,5 +34,9 @@ void scene_moments_free(SceneMoments *moments);
 /// and empty elsewhere. Wraps. w and h even.
 void scene_noise(int w, int h, float low, float high, uint64_t seed, float *grey);
 
+/// How much longer along x than along y the features of pixels[][stride][3]'s first channel are, within [x0, x1) x
+/// [y0, y1). The pixels around are read too.
+double scene_elongation(const float *pixels, int stride, int x0, int y0, int x1, int y1);
+
 /// A tiling exemplar of three channels of such noise, partly alike, 0 to 1.
 RfExemplar *scene_noise_exemplar(int size, uint64_t seed);

@@ -413,7 +413,8 @@ static RfResult dress(Birth *birth, const StepFlow *flow, RfArena *arena)
         float others = weight_at_centre(&patch);
         grid->others = rf_clamp(others, UNCOVERED, 1);
         grid->fade_in = rf_lagrangian_fade_length(l, grid->strain, others > UNCOVERED ? grid->others : 0);
-        grid->birth = flow->from;
+        // A step of no length would show nothing of it, and where it is alone leave a hole: there it is a frame old.
+        grid->birth = flow->view->time > flow->from ? flow->from : flow->from - 1;
     }
     if (l->options.candidates > 1 && l->options.blend != RF_BLEND_PLAIN)
         RF_TRY(measure_resemblances(birth, halvings, arena));
