@@ -764,19 +764,20 @@ static bool judge_impatiently(int stopped, int patience, RfMeasureFrame *last, R
 {
     Patience state = {patience};
     const RfProgress progress = {lose_patience, &state};
-    RfImageView exemplar = grey(g_texture), frames[3] = {grey(g_texture), grey(g_next), grey(g_texture)};
+    float *pixels[3] = {g_texture, g_next, g_texture};
+    RfImageView exemplar = {g_texture, 32, 32, 1, N};
     RfMeasureOptions options = rf_measure_defaults();
     options.flow_every = options.patch_every = 1;
-    exemplar.width = exemplar.height = 48;
     RfMeasure *measure = make(&exemplar, options);
     RfMeasureSummary summary;
     bool through = stopped < 0;
     for (int f = 0; f < 3; ++f)
     {
         RfFlowView flow = flow_of(g_velocity, f);
+        RfImageView frame = {pixels[f], 48, 48, 1, N};
         RfMeasureFrame m = {.index = 77}, kept = m;
         rf_set_progress(f == stopped ? &progress : NULL);
-        RfResult result = rf_measure_step(measure, &flow, NULL, &frames[f], &m);
+        RfResult result = rf_measure_step(measure, &flow, NULL, &frame, &m);
         rf_set_progress(NULL);
         through |= f == stopped && result == RF_OK;
         if (result != RF_OK)
@@ -786,7 +787,7 @@ static bool judge_impatiently(int stopped, int patience, RfMeasureFrame *last, R
             rf_measure_summary(measure, &summary);
             assert_int_equal(summary.frames, f);
             assert_false(rf_measure_has_map(measure, RF_MEASURE_MAP_HOLES));
-            assert_int_equal(rf_measure_step(measure, &flow, NULL, &frames[f], &m), RF_OK);
+            assert_int_equal(rf_measure_step(measure, &flow, NULL, &frame, &m), RF_OK);
         }
         *last = m;
     }
