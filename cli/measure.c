@@ -138,8 +138,8 @@ static int check_gaps(const Judging *judging)
     bool changes = settings->flow && judging->flow.info.moment_count != 1;
     if (changes && settings->frame_step > 1)
         return fail(CODE_USAGE, NULL, NULL,
-                    "--frames %d-%dx%d: motion is judged from each frame to the next; leave x%d out, and --flow-every "
-                    "and --patch-every take fewer",
+                    "--frames %d-%dx%d: motion is judged from each frame to the next; leave x%d out, and "
+                    "--flow-every, --flicker-every and --patch-every take fewer",
                     settings->first_frame, settings->last_frame, settings->frame_step, settings->frame_step);
     for (int i = 1, usual = 0; i < plan->count; ++i)
     {

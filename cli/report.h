@@ -45,7 +45,7 @@ int report_rows(const Report *report, ReportRow rows[MAX_REPORT_ROWS]);
 int report_quantity(const char *name);
 /// The index-th frame's value of a quantity.
 double report_value(const Report *report, int frame, int quantity);
-/// "frames a.%04d.png: 60, number 1 to 60, 512 x 512 pixels".
+/// "a.%04d.png: 60 frames, 1 to 60, 512 x 512 pixels".
 void report_heading(const Report *report, char *text, size_t size);
 /// What could not be judged and why, one line; empty where nothing is missing.
 void report_missing(const Report *report, char *text, size_t size);

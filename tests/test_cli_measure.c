@@ -17,21 +17,26 @@ static TestFolder g_folder;
 static float g_noise[N * N];
 
 /// The texture moved by (x, y) pixels; it wraps, so that nothing is new. Holed: its corner is exactly black.
-static void put_frame(const char *name, int dx, int dy, bool holed)
+static void put_frame_of(const char *name, int side, int dx, int dy, bool holed)
 {
     RfImage *image = NULL;
-    assert_int_equal(rf_image_create(N, N, 3, &image), RF_OK);
+    assert_int_equal(rf_image_create(side, side, 3, &image), RF_OK);
     RfImageView view = rf_image_view(image);
-    for (int y = 0; y < N; ++y)
-        for (int x = 0; x < N; ++x)
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x)
             for (int c = 0; c < 3; ++c)
             {
                 float value = g_noise[(y - dy + N) % N * N + (x - dx + N) % N];
-                view.pixels[3 * (y * N + x) + c] = holed && x < 24 && y < 24 ? 0 : value;
+                view.pixels[3 * (y * side + x) + c] = holed && x < 24 && y < 24 ? 0 : value;
             }
     rf_image_set_origin(image, RF_SAMPLE_U8, RF_ENCODING_SRGB);
     assert_int_equal(rf_image_write(test_folder_file(&g_folder, name), image), RF_OK);
     rf_image_destroy(image);
+}
+
+static void put_frame(const char *name, int dx, int dy, bool holed)
+{
+    put_frame_of(name, N, dx, dy, holed);
 }
 
 static void put_flow(const char *name, float x, float y)
@@ -105,6 +110,8 @@ static void frames_that_follow_the_flow_read_like_the_floor_and_frozen_ones_do_n
     assert_true(summary_value(good, "flow-error", "ratio") < 2);
     assert_true(summary_value(good, "flicker", "mean") < 0.02);
     assert_true(summary_value(good, "holes", "mean") == 0);
+    // One velocity everywhere.
+    assert_true(summary_value(good, "divergence", "mean") == 0 && summary_value(good, "divergence", "count") == FRAMES);
     // What stands still misses the whole motion: the square root of 10.
     assert_true(fabs(summary_value(frozen, "flow-error", "mean") - sqrt(10)) < 0.1);
     assert_true(summary_value(frozen, "flow-error", "ratio") > 20);
@@ -192,9 +199,26 @@ static void every_number_of_the_json_is_the_librarys_own(void **state)
 static void the_report_is_the_same_for_any_number_of_threads(void **state)
 {
     (void)state;
-    expect(&g_folder, GOOD "--report one.json --threads 1", 0);
-    expect(&g_folder, GOOD "--report three.json --threads 3", 0);
-    assert_same_file(&g_folder, "one.json", &g_folder, "three.json");
+    static const char *const estimators[] = {"inverse-search", "lucas-kanade"};
+    // So large that threads share them, at half resolution too.
+    put_frame_of("large.1.png", 4 * N, 0, 0, false);
+    put_frame_of("large.2.png", 4 * N, 12, 4, false);
+    for (int i = 0; i < 2; ++i)
+    {
+        char line[256];
+        for (int threads = 1; threads <= 3; threads += 2)
+        {
+            snprintf(line, sizeof line,
+                     "measure large.%%d.png --flow flow.flo --exemplar good.0001.png --estimator %s -q -y --report "
+                     "threads%d.json --threads %d",
+                     estimators[i], threads, threads);
+            expect(&g_folder, line, 0);
+        }
+        assert_same_file(&g_folder, "threads1.json", &g_folder, "threads3.json");
+        char *json = read_text("threads1.json");
+        assert_true(summary_value(json, "flow-error", "count") == 1 && summary_value(json, "flicker", "count") == 1);
+        free(json);
+    }
 }
 
 static void the_page_holds_everything_it_shows(void **state)
@@ -202,9 +226,9 @@ static void the_page_holds_everything_it_shows(void **state)
     (void)state;
     static const char *const absent[] = {"http:", "https:", "<script", "<link", "@import",
                                          "url(",  "srcset", "nan",     "inf "};
-    static const char *const present[] = {"<!doctype html>", "Flow error",           "Radial power spectrum",
-                                          "Patch residual",  "Use of the exemplar",  "</html>",
-                                          "flow-error",      "prefers-color-scheme", "Frame 4</b>, the last"};
+    static const char *const present[] = {
+        "<!doctype html>", "Flow error", "Radial power spectrum", "Patch residual",        "Use of the exemplar",
+        "</html>",         "flow-error", "prefers-color-scheme",  "Frame 4</b>, the last", ">divergence</td>"};
     expect(&g_folder, GOOD "--report page.html", 0);
     char *page = read_text("page.html");
     for (size_t i = 0; i < sizeof present / sizeof present[0]; ++i)
@@ -233,6 +257,8 @@ static void a_still_picture_is_judged_by_its_exemplar_alone(void **state)
     assert_non_null(strstr(result.out, "good.0002.png: one frame, 96 x 96 pixels\n"));
     assert_non_null(strstr(result.out, "\nspectrum "));
     assert_non_null(strstr(result.out, "\npatch-share "));
+    assert_null(strstr(result.out, "\npatch-share-floor "));
+    assert_null(strstr(result.out, "\ndivergence "));
     assert_null(strstr(result.out, "\nflow-error "));
     assert_non_null(strstr(result.out, "Not judged: flow error and flicker (no --flow)\n"));
     assert_true(count_lines(result.out) <= 25);
@@ -272,6 +298,7 @@ static void json_events_go_to_stderr_and_the_numbers_to_stdout(void **state)
     assert_non_null(strstr(result.err, "{\"event\":\"done\",\"frames\":4,"));
     assert_true(json_is_well_formed(result.out, strlen(result.out)));
     assert_non_null(strstr(result.out, "\"flow-error\":{"));
+    assert_non_null(strstr(result.out, "\"divergence\":0"));
     command_free(&result);
 }
 

@@ -149,6 +149,21 @@ static void a_larger_pop_is_told_as_larger_and_where_it_is(void **state)
     assert_true(block > 1);
 }
 
+static void a_frame_gone_flat_has_no_flicker_to_tell_and_one_that_stays_flat_has_none(void **state)
+{
+    (void)state;
+    static float flat[PIXELS];
+    for (int k = 0; k < PIXELS; ++k)
+        flat[k] = 0.3f;
+    RfMeasureFrame gone = judge_pair(g_velocity, g_texture, flat, NULL),
+                   stays = judge_pair(g_velocity, flat, flat, NULL);
+    assert_true(isnan(gone.flicker.whole) && isnan(gone.flicker.block) && isnan(gone.flicker.ratio));
+    assert_true(gone.contrast.luma < 1e-3);
+    assert_true(stays.flicker.whole == 0 && stays.flicker.block == 0 && isnan(stays.flicker.ratio));
+    // Coming back is a change like any other.
+    assert_true(judge_pair(g_velocity, flat, g_next, NULL).flicker.whole > 0.9);
+}
+
 static void what_happens_on_land_changes_nothing(void **state)
 {
     (void)state;
@@ -222,6 +237,10 @@ static void the_exemplar_itself_is_at_no_distance(void **state)
     assert_true(m.patch.residual < 1e-3 && m.patch.missing < 1e-3 && m.patch.floor > 5 && m.patch.share > 0.9);
     assert_true(m.contrast.luma == 1 && m.contrast.histogram_mover == 0 && m.contrast.brightness == 0);
     assert_true(m.contrast.mover_floor > 0 && m.contrast.luma_floor > 0 && m.contrast.luma_floor < 0.2);
+    assert_true(m.contrast.l1_floor > 0 && m.contrast.l1_floor < 0.5);
+    // Grey values that move by more than the mean does.
+    assert_true(m.contrast.brightness_floor > 0 && m.contrast.brightness_floor < m.contrast.mover_floor + 1e-9);
+    assert_true(m.patch.share_floor > 0.3 && m.patch.share_floor < m.patch.share);
     assert_true(m.coverage.fluid == PIXELS && m.coverage.holes == 0);
 }
 
@@ -254,6 +273,8 @@ static void another_sample_of_the_texture_is_as_good_as_the_floors_and_white_noi
     RfMeasureFrame alike = judge(g_frame);
     assert_true(alike.spectrum.ratio < 1 && fabs(alike.spectrum.pair_ratio - 1) < 0.3);
     assert_true(fabs(alike.patch.ratio - 1) < 0.1 && fabs(alike.patch.missing_ratio - 1) < 0.1);
+    assert_true(fabs(alike.patch.share / alike.patch.share_floor - 1) < 0.1);
+    assert_true(alike.contrast.histogram_l1 < 2 * alike.contrast.l1_floor);
     for (int k = 0; k < PIXELS; ++k)
         g_frame[k] = rf_random_float(5, 0, (uint64_t)k, 0);
     RfMeasureFrame white = judge(g_frame);
@@ -437,6 +458,32 @@ static void a_source_diverges_by_its_strength_and_a_rotation_does_not(void **sta
     assert_true(isnan(d.relative) && d.rms_speed == 0);
 }
 
+static void each_frame_has_the_divergence_of_its_own_moment(void **state)
+{
+    (void)state;
+    RfImageView frame = grey(g_texture);
+    RfMeasure *measure = make(NULL, rf_measure_defaults());
+    RfMeasureFrame m;
+    RfMeasureDivergence d;
+    assert_int_equal(rf_measure_step(measure, NULL, NULL, &frame, &m), RF_OK);
+    assert_true(isnan(m.divergence));
+    for (int moment = 1; moment <= 2; ++moment)
+    {
+        // A rotation and a source that grows.
+        for (int k = 0; k < PIXELS; ++k)
+        {
+            float x = 0.01f * (float)(k % N - N / 2), y = 0.01f * (float)(k / N - N / 2);
+            g_claimed[2 * k] = -y + 0.1f * (float)moment * x;
+            g_claimed[2 * k + 1] = x + 0.1f * (float)moment * y;
+        }
+        RfFlowView flow = flow_of(g_claimed, moment);
+        assert_int_equal(rf_measure_divergence(&flow, &d), RF_OK);
+        assert_int_equal(rf_measure_step(measure, &flow, NULL, &frame, &m), RF_OK);
+        assert_true(m.divergence == d.relative && d.rms_divergence > 0.0019 * moment);
+    }
+    rf_measure_destroy(measure);
+}
+
 // ---- the stepper -------------------------------------------------------------------------------------------------
 
 static void every_double_of_a_frame_has_its_line_in_the_table(void **state)
@@ -500,6 +547,7 @@ static void the_summary_has_means_ratios_of_means_and_the_worst_frame(void **sta
     RfImageView exemplar = grey(g_texture), frame = grey(g_frame);
     RfMeasureOptions options = rf_measure_defaults();
     options.flow_every = 2;
+    options.flicker_every = 4;
     options.patch_every = 3;
     RfMeasure *measure = make(&exemplar, options);
     assert_true(statistic(measure, "contrast").count == 0 && isnan(statistic(measure, "contrast").mean));
@@ -515,11 +563,16 @@ static void the_summary_has_means_ratios_of_means_and_the_worst_frame(void **sta
         assert_true(m.index == f);
         assert_true(isnan(m.flow.error) == (f % 2 == 0) && isnan(m.patch.residual) == (f % 3 != 0));
         assert_true(rf_measure_has_map(measure, RF_MEASURE_MAP_FLOW_ERROR) == !isnan(m.flow.error));
+        // The first frame with a predecessor, and the fourth behind it.
+        assert_true(isnan(m.flicker.whole) == (f != 1 && f != 5));
+        assert_true(rf_measure_has_map(measure, RF_MEASURE_MAP_FLICKER) == !isnan(m.flicker.whole));
+        assert_true(rf_measure_has_map(measure, RF_MEASURE_MAP_BLOCKS) == !isnan(m.flicker.whole));
         error += f % 2 ? m.flow.error : 0;
         floor += f % 2 ? m.flow.floor : 0;
         contrast += m.contrast.luma / 7;
     }
     assert_true(statistic(measure, "flow-error").count == 3 && statistic(measure, "patch").count == 3);
+    assert_true(statistic(measure, "flicker").count == 2);
     assert_true(fabs(statistic(measure, "flow-error").mean - error / 3) < 1e-12);
     assert_true(fabs(statistic(measure, "flow-ratio").mean - error / floor) < 1e-12);
     assert_true(fabs(statistic(measure, "contrast").mean - contrast) < 1e-12);
@@ -593,24 +646,36 @@ static void maps_hold_what_the_numbers_are_made_of(void **state)
     rf_measure_destroy(measure);
 }
 
-static RfMeasureFrame judge_coloured(int threads)
+enum
 {
-    static float pixels[3 * PIXELS];
-    RfImageView exemplar = {pixels, N, N, 3, 3 * N}, frame = {pixels, N, N, 3, 3 * N};
+    // Walks are shared among threads from 2^15 pixels on, and inverse search walks at half resolution.
+    LARGE = 384
+};
+
+static float g_large[LARGE * LARGE], g_large_next[LARGE * LARGE];
+
+static RfMeasureFrame judge_coloured(RfMeasureEstimator estimator, int threads)
+{
+    static float pixels[3 * LARGE * LARGE];
+    RfImageView exemplar = {pixels, N, N, 3, 3 * LARGE}, frame = {pixels, LARGE, LARGE, 3, 3 * LARGE};
     RfMeasureFrame m;
     rf_set_threads(threads);
-    for (int k = 0; k < 3 * PIXELS; ++k)
-        pixels[k] = g_texture[k / 3] * (0.5f + 0.2f * (float)(k % 3));
+    for (int k = 0; k < 3 * LARGE * LARGE; ++k)
+        pixels[k] = g_large[k / 3] * (0.5f + 0.2f * (float)(k % 3));
     RfMeasureOptions options = rf_measure_defaults();
-    options.patch_every = 1;
+    options.estimator = estimator;
+    options.patch_stride = 24;
     options.rotations = 3;
     RfMeasure *measure = make(&exemplar, options);
     RfFlowView flow = flow_of(g_velocity, 0);
     assert_int_equal(rf_measure_step(measure, &flow, NULL, &frame, &m), RF_OK);
-    for (int k = 0; k < 3 * PIXELS; ++k)
-        pixels[k] = g_next[k / 3] * (0.6f + 0.2f * (float)(k % 3));
+    assert_false(isnan(m.patch.residual));
+    RfMeasureFrame first = m;
+    for (int k = 0; k < 3 * LARGE * LARGE; ++k)
+        pixels[k] = g_large_next[k / 3] * (0.6f + 0.2f * (float)(k % 3));
     flow.time = 1;
     assert_int_equal(rf_measure_step(measure, &flow, NULL, &frame, &m), RF_OK);
+    m.patch = first.patch;
     rf_measure_destroy(measure);
     rf_set_threads(0);
     return m;
@@ -619,9 +684,16 @@ static RfMeasureFrame judge_coloured(int threads)
 static void results_are_the_same_bytes_for_any_number_of_threads(void **state)
 {
     (void)state;
-    RfMeasureFrame one = judge_coloured(1), three = judge_coloured(3);
-    assert_memory_equal(&one, &three, sizeof one);
-    assert_true(!isnan(one.patch.residual) && !isnan(one.flow.error) && !isnan(one.contrast.channel[2]));
+    scene_noise(LARGE, LARGE, 0.02f, 0.25f, 3, g_large);
+    for (int k = 0; k < LARGE * LARGE; ++k)
+        g_large_next[k] = g_large[k / LARGE * LARGE + (k % LARGE + LARGE - 2) % LARGE];
+    for (int estimator = 0; estimator < 2; ++estimator)
+    {
+        RfMeasureFrame one = judge_coloured((RfMeasureEstimator)estimator, 1);
+        RfMeasureFrame three = judge_coloured((RfMeasureEstimator)estimator, 3);
+        assert_memory_equal(&one, &three, sizeof one);
+        assert_true(!isnan(one.flow.error) && !isnan(one.flicker.whole) && !isnan(one.contrast.channel[2]));
+    }
 }
 
 static void misuse_is_refused_and_a_refused_step_does_not_count(void **state)
@@ -643,6 +715,18 @@ static void misuse_is_refused_and_a_refused_step_does_not_count(void **state)
     assert_int_equal(rf_measure_create(&frame, &options, &measure), RF_INVALID_ARGUMENT);
     options = rf_measure_defaults();
     assert_int_equal(rf_measure_create(&small, &options, &measure), RF_BAD_INPUT);
+    // Too many in so many copies; without the patches nobody looks for them.
+    static float wide[512 * 512];
+    RfImageView large = {wide, 512, 512, 1, 512};
+    options.rotations = 72;
+    assert_int_equal(rf_measure_create(&large, &options, &measure), RF_UNSUPPORTED);
+    assert_null(measure);
+    options.patch_every = 0;
+    measure = make(&large, options);
+    rf_measure_destroy(measure);
+    measure = NULL;
+    options = rf_measure_defaults();
+    assert_int_equal(rf_measure_create(&small, &options, &measure), RF_BAD_INPUT);
     assert_null(measure);
     measure = make(&frame, options);
     assert_int_equal(rf_measure_step(measure, NULL, NULL, &small, &m), RF_INVALID_ARGUMENT);
@@ -659,6 +743,77 @@ static void misuse_is_refused_and_a_refused_step_does_not_count(void **state)
     assert_int_equal(summary.frames, 1);
     rf_measure_destroy(measure);
     rf_measure_destroy(NULL);
+}
+
+typedef struct Patience
+{
+    int left;
+} Patience;
+
+static bool lose_patience(void *user, const char *stage, double fraction)
+{
+    (void)fraction;
+    Patience *patience = user;
+    assert_string_equal(stage, "judging");
+    return patience->left-- > 0;
+}
+
+// Three steps, of which number `stopped` is stopped at its report number `patience` and then taken again. True if it
+// had fewer.
+static bool judge_impatiently(int stopped, int patience, RfMeasureFrame *last, RfMeasureSpectra *spectra)
+{
+    Patience state = {patience};
+    const RfProgress progress = {lose_patience, &state};
+    float *pixels[3] = {g_texture, g_next, g_texture};
+    RfImageView exemplar = {g_texture, 32, 32, 1, N};
+    RfMeasureOptions options = rf_measure_defaults();
+    options.flow_every = options.patch_every = 1;
+    RfMeasure *measure = make(&exemplar, options);
+    RfMeasureSummary summary;
+    bool through = stopped < 0;
+    for (int f = 0; f < 3; ++f)
+    {
+        RfFlowView flow = flow_of(g_velocity, f);
+        RfImageView frame = {pixels[f], 48, 48, 1, N};
+        RfMeasureFrame m = {.index = 77}, kept = m;
+        rf_set_progress(f == stopped ? &progress : NULL);
+        RfResult result = rf_measure_step(measure, &flow, NULL, &frame, &m);
+        rf_set_progress(NULL);
+        through |= f == stopped && result == RF_OK;
+        if (result != RF_OK)
+        {
+            assert_int_equal(result, RF_CANCELLED);
+            assert_memory_equal(&m, &kept, sizeof m);
+            rf_measure_summary(measure, &summary);
+            assert_int_equal(summary.frames, f);
+            assert_false(rf_measure_has_map(measure, RF_MEASURE_MAP_HOLES));
+            assert_int_equal(rf_measure_step(measure, &flow, NULL, &frame, &m), RF_OK);
+        }
+        *last = m;
+    }
+    rf_measure_spectra(measure, spectra);
+    rf_measure_destroy(measure);
+    return through;
+}
+
+static void a_step_stopped_anywhere_is_as_if_it_had_not_been(void **state)
+{
+    (void)state;
+    static RfMeasureSpectra whole_spectra, spectra;
+    RfMeasureFrame whole, m;
+    judge_impatiently(-1, 0, &whole, &whole_spectra);
+    for (int stopped = 0; stopped < 3; stopped += 2)
+    {
+        int reports = 0;
+        while (!judge_impatiently(stopped, reports, &m, &spectra))
+        {
+            assert_memory_equal(&m, &whole, sizeof m);
+            assert_memory_equal(&spectra, &whole_spectra, sizeof spectra);
+            ++reports;
+        }
+        // At its start, between flicker and flow error, before spectrum and patches, and for a strip of the frame.
+        assert_int_equal(reports, stopped == 0 ? 4 : 5);
+    }
 }
 
 // ---- memory ------------------------------------------------------------------------------------------------------
@@ -682,6 +837,16 @@ static void scarce_release(void *memory, void *user)
     free(memory);
 }
 
+// A first frame of another size, larger than the one that found no memory, is judged after all.
+static void judge_larger(RfMeasure *measure)
+{
+    RfImageView larger = {g_texture, 96, 80, 1, N};
+    RfMeasureFrame m;
+    g_left = 100000;
+    assert_int_equal(rf_measure_step(measure, NULL, NULL, &larger, &m), RF_OK);
+    assert_true(m.index == 0 && m.coverage.fluid == 96 * 80 && !isnan(m.patch.residual));
+}
+
 // Two steps with at most `allocations` allocations. True if they sufficed.
 static bool judge_scarcely(int allocations)
 {
@@ -696,8 +861,8 @@ static bool judge_scarcely(int allocations)
     mask[5 * 48 + 5] = 0;
     g_left = allocations;
     RfResult result = rf_measure_create(&exemplar, &options, &measure);
-    if (result == RF_OK)
-        result = rf_measure_step(measure, &flow, mask, &a, &m);
+    if (result == RF_OK && (result = rf_measure_step(measure, &flow, mask, &a, &m)) != RF_OK)
+        judge_larger(measure);
     flow.time = 1;
     if (result == RF_OK)
         result = rf_measure_step(measure, &flow, mask, &b, &m);
@@ -728,6 +893,7 @@ int main(void)
         cmocka_unit_test(an_exact_warp_follows_the_flow_and_does_not_flicker),
         cmocka_unit_test(a_flow_that_is_more_wrong_has_more_flow_error_and_more_flicker),
         cmocka_unit_test(a_larger_pop_is_told_as_larger_and_where_it_is),
+        cmocka_unit_test(a_frame_gone_flat_has_no_flicker_to_tell_and_one_that_stays_flat_has_none),
         cmocka_unit_test(what_happens_on_land_changes_nothing),
         cmocka_unit_test(steps_of_two_frames_follow_twice_the_motion),
         cmocka_unit_test(the_exemplar_itself_is_at_no_distance),
@@ -740,12 +906,14 @@ int main(void)
         cmocka_unit_test(black_is_no_hole_where_the_exemplar_has_black),
         cmocka_unit_test(a_frame_of_nothing_but_holes_gives_no_other_number),
         cmocka_unit_test(a_source_diverges_by_its_strength_and_a_rotation_does_not),
+        cmocka_unit_test(each_frame_has_the_divergence_of_its_own_moment),
         cmocka_unit_test(every_double_of_a_frame_has_its_line_in_the_table),
         cmocka_unit_test(the_option_table_has_the_defaults_and_every_option),
         cmocka_unit_test(the_summary_has_means_ratios_of_means_and_the_worst_frame),
         cmocka_unit_test(maps_hold_what_the_numbers_are_made_of),
         cmocka_unit_test(results_are_the_same_bytes_for_any_number_of_threads),
         cmocka_unit_test(misuse_is_refused_and_a_refused_step_does_not_count),
+        cmocka_unit_test(a_step_stopped_anywhere_is_as_if_it_had_not_been),
         cmocka_unit_test(any_allocation_may_fail_and_nothing_leaks),
     };
     return cmocka_run_group_tests_name("measure", tests, make_inputs, NULL);

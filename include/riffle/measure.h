@@ -124,7 +124,8 @@ typedef struct RfMeasureFlow
     double pixels;
 } RfMeasureFlow;
 
-/// Does it pop? Needs a flow and a predecessor. All over the frame's own rms contrast.
+/// Does it pop? Needs a flow and a predecessor. All over the frame's own rms contrast; of a frame without any, 0 where
+/// it does not differ from the one carried, and NaN where it does.
 typedef struct RfMeasureFlicker
 {
     /// Rms difference between the frame and the previous one carried by the flow; floor: carrying there and back.
@@ -160,6 +161,8 @@ typedef struct RfMeasurePatch
     /// Effective fraction of the exemplar that the matches use: exp of the entropy of their places in 16 x 16 cells,
     /// over 256. Low where one place repeats.
     double share;
+    /// The share of the exemplar's own windows' matches to its other, not overlapping ones.
+    double share_floor;
     /// The exemplar's own windows to its other, not overlapping ones: what a fresh piece of the same texture would get.
     double floor, ratio, missing_ratio;
     /// Windows compared, frame to exemplar.
@@ -175,8 +178,9 @@ typedef struct RfMeasureContrast
     double brightness;
     /// Between the histograms of grey: half the L1 distance (0 to 1, 64 bins), and the earth mover's, in grey levels.
     double histogram_l1, histogram_mover;
-    /// Mean |luma - 1| and mean histogram_mover of random crops of the exemplar, half its side, against the whole.
-    double luma_floor, mover_floor;
+    /// Of random crops of the exemplar, half its side, against the whole: mean |luma - 1|, |brightness|, histogram_l1
+    /// and histogram_mover.
+    double luma_floor, brightness_floor, l1_floor, mover_floor;
 } RfMeasureContrast;
 
 /// Holes. The floor is 0.
@@ -197,6 +201,8 @@ typedef struct RfMeasureFrame
     RfMeasurePatch patch;
     RfMeasureContrast contrast;
     RfMeasureCoverage coverage;
+    /// Of the flow that came with it: RfMeasureDivergence's `relative`. The floor is 0.
+    double divergence;
 } RfMeasureFrame;
 
 /// What makes a quantity bad.
@@ -251,6 +257,9 @@ typedef struct RfMeasure RfMeasure;
 
 /// exemplar: may be NULL; copied. Either side 16 pixels or more, its alpha (2nd or 4th channel) is not looked at. From
 /// an RfExemplar: rf_exemplar_map(exemplar, 0, NULL).image.
+///
+/// RF_UNSUPPORTED if the patch distance is asked for and the exemplar has more than 2^24 windows: about its pixels
+/// times rotations, times 4 with half_pixel.
 RF_API RF_MUST_USE RfResult rf_measure_create(const RfImageView *exemplar, const RfMeasureOptions *options,
                                               RfMeasure **out);
 
@@ -259,7 +268,8 @@ RF_API RF_MUST_USE RfResult rf_measure_create(const RfImageView *exemplar, const
 /// flow: may be NULL. The frame's moment is flow->time, which must be later than at the step before; the motion from
 /// the step before to this one is integrated along the paths. A step without a flow has no motion to judge, and the
 /// step after it takes itself to be one frame later. mask: [height][width] of the frame, 0 outside the fluid; NULL: the
-/// flow's mask, or fluid everywhere. On failure `out` holds its old content and the frame is not counted.
+/// flow's mask, or fluid everywhere. On failure `out` holds its old content and the frame is not counted: the next step
+/// goes on from the one before it. Between the measures it asks the thread's RfProgress whether to go on.
 RF_API RF_MUST_USE RfResult rf_measure_step(RfMeasure *measure, const RfFlowView *flow, const uint8_t *mask,
                                             const RfImageView *frame, RfMeasureFrame *out);
 

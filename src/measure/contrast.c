@@ -69,7 +69,8 @@ static double deviation_ratio(double frame, double exemplar)
 
 static void compare(const Statistics *f, const Statistics *e, int channels, RfMeasureContrast *out)
 {
-    *out = (RfMeasureContrast){.channel = {NAN, NAN, NAN}, .luma_floor = NAN, .mover_floor = NAN};
+    *out = (RfMeasureContrast){
+        .channel = {NAN, NAN, NAN}, .luma_floor = NAN, .brightness_floor = NAN, .l1_floor = NAN, .mover_floor = NAN};
     for (int c = 0; c < channels; ++c)
         out->channel[c] = deviation_ratio(f->deviation[c], e->deviation[c]);
     out->luma = deviation_ratio(f->deviation[LUMA], e->deviation[LUMA]);
@@ -104,7 +105,7 @@ void rf_measure_contrast_floor(const RfImageView *exemplar, uint64_t seed, RfMea
 {
     Statistics whole, part;
     gather_statistics(exemplar, NULL, &whole);
-    double luma = 0, mover = 0;
+    double luma = 0, brightness = 0, l1 = 0, mover = 0;
     for (int i = 0; i < FLOOR_CROPS; ++i)
     {
         RfImageView crop = *exemplar;
@@ -117,8 +118,12 @@ void rf_measure_contrast_floor(const RfImageView *exemplar, uint64_t seed, RfMea
         gather_statistics(&crop, NULL, &part);
         compare(&part, &whole, 1, &c);
         luma += fabs(c.luma - 1) / FLOOR_CROPS;
+        brightness += fabs(c.brightness) / FLOOR_CROPS;
+        l1 += c.histogram_l1 / FLOOR_CROPS;
         mover += c.histogram_mover / FLOOR_CROPS;
     }
     out->luma_floor = luma;
+    out->brightness_floor = brightness;
+    out->l1_floor = l1;
     out->mover_floor = mover;
 }

@@ -14,6 +14,9 @@ enum
     BLOCK = 32
 };
 
+// Grey levels that rounding alone may leave.
+static const double g_nothing = 1e-3;
+
 static double rms_contrast(const float *grey, const uint8_t *counted, size_t count)
 {
     double sum = 0, squares = 0, n = 0;
@@ -105,11 +108,13 @@ static Difference difference(const Comparison *c)
     return result;
 }
 
+// A frame with no contrast is like the previous one if nothing changed; otherwise no number says how much did.
 static void compare(const RfFramePair *pair, const float *carried, const float *back, const uint8_t *counted,
                     float *difference_map, float *block_map, RfMeasureFlicker *out)
 {
     double contrast = rms_contrast(pair->b, counted, (size_t)pair->w * (size_t)pair->h);
-    double scale = contrast > 1e-6 ? 1 / contrast : 0;
+    Comparison bare = {pair->b, carried, counted, pair->w, pair->h, 1, NULL, NULL};
+    double scale = contrast > g_nothing ? 1 / contrast : whole_difference(&bare) <= g_nothing ? 0 : (double)NAN;
     Comparison step = {pair->b, carried, counted, pair->w, pair->h, scale, difference_map, block_map};
     Comparison there_and_back = {pair->a, back, counted, pair->w, pair->h, scale, NULL, NULL};
     Difference now = difference(&step), floor = difference(&there_and_back);

@@ -31,7 +31,7 @@ RfResult rf_measure_block_changes(const RfFramePair *pair, const float *displace
 /// Only pixels in the mask count. Without floors.
 void rf_measure_contrast(const RfImageView *frame, const uint8_t *mask, const RfImageView *exemplar,
                          RfMeasureContrast *out);
-/// Of 32 random crops of the exemplar, half its side, against the whole: sets luma_floor and mover_floor.
+/// Of 32 random crops of the exemplar, half its side, against the whole: sets the floors alone.
 void rf_measure_contrast_floor(const RfImageView *exemplar, uint64_t seed, RfMeasureContrast *out);
 
 /// Clears in known[h][w] the pixels of `fluid` (NULL: all) that are holes, and those that are no fluid.

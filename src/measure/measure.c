@@ -171,7 +171,10 @@ static RfResult check_exemplar(const RfImageView *exemplar, const RfMeasureOptio
                options->spectrum_crop, exemplar->width, exemplar->height);
     RF_REQUIRE(options->patch_size <= least, "patch-size %d: the exemplar has %d x %d pixels", options->patch_size,
                exemplar->width, exemplar->height);
-    return RF_OK;
+    if (options->patch_every == 0)
+        return RF_OK;
+    return rf_patches_check(exemplar->width, exemplar->height, options->patch_size, options->rotations,
+                            options->half_pixel);
 }
 
 RfResult rf_measure_create(const RfImageView *exemplar, const RfMeasureOptions *options, RfMeasure **out)
@@ -200,21 +203,36 @@ RfResult rf_measure_create(const RfImageView *exemplar, const RfMeasureOptions *
     return RF_OK;
 }
 
-void rf_measure_destroy(RfMeasure *m)
+// As before the first frame: what depends on its size goes, so that another one may be the first.
+static void forget_frames(RfMeasure *m)
 {
-    if (!m)
-        return;
     for (int i = 0; i < MAPS; ++i)
+    {
         rf_release(m->maps[i]);
+        m->maps[i] = NULL;
+    }
     for (int i = 0; i < 2; ++i)
     {
         rf_release(m->frames[i].grey);
         rf_release(m->frames[i].known);
+        m->frames[i] = (Frame){0};
     }
     rf_release(m->fluid);
     rf_release(m->displacement);
     rf_spectrometer_destroy(m->spectrometer);
     rf_patches_destroy(m->patches);
+    m->fluid = NULL;
+    m->displacement = NULL;
+    m->spectrometer = NULL;
+    m->patches = NULL;
+    m->width = m->height = m->channels = 0;
+}
+
+void rf_measure_destroy(RfMeasure *m)
+{
+    if (!m)
+        return;
+    forget_frames(m);
     rf_release(m->exemplar.pixels);
     rf_release(m->exemplar_grey);
     rf_release(m);
@@ -227,24 +245,21 @@ static int map_channels(RfMeasureMap map)
     return map == RF_MEASURE_MAP_MOTION || map == RF_MEASURE_MAP_SOURCE ? 2 : 1;
 }
 
+// On failure some are there and some are not: forget_frames.
 static RfResult make_frames(RfMeasure *m, const RfImageView *frame)
 {
     size_t count = (size_t)frame->width * (size_t)frame->height;
     bool complete = true;
-    for (int i = 0; i < 2 && complete; ++i)
-        complete = (m->frames[i].grey || (m->frames[i].grey = rf_allocate(count, sizeof(float)))) &&
-                   (m->frames[i].known || (m->frames[i].known = rf_allocate(count, 1)));
-    complete = complete && (m->fluid || (m->fluid = rf_allocate(count, 1))) &&
-               (m->displacement || (m->displacement = rf_allocate(count, 2 * sizeof(float))));
-    for (int i = 0; i < MAPS && complete; ++i)
-        complete =
-            m->maps[i] || (m->maps[i] = rf_allocate(count, (size_t)map_channels((RfMeasureMap)i) * sizeof(float)));
-    if (!complete)
-        return RF_OUT_OF_MEMORY;
+    for (int i = 0; i < 2; ++i)
+        complete &=
+            (m->frames[i].grey = rf_allocate(count, sizeof(float))) && (m->frames[i].known = rf_allocate(count, 1));
+    complete &= (m->fluid = rf_allocate(count, 1)) && (m->displacement = rf_allocate(count, 2 * sizeof(float)));
+    for (int i = 0; i < MAPS; ++i)
+        complete &= (m->maps[i] = rf_allocate(count, (size_t)map_channels((RfMeasureMap)i) * sizeof(float))) != NULL;
     m->width = frame->width;
     m->height = frame->height;
     m->channels = frame->channels;
-    return RF_OK;
+    return complete ? RF_OK : RF_OUT_OF_MEMORY;
 }
 
 static RfResult check_frame(const RfMeasure *m, const RfFlowView *flow, const RfImageView *frame)
@@ -324,6 +339,7 @@ static RfResult judge_motion(RfMeasure *m, const RfFlowView *flow, const Frame *
     m->has_map[RF_MEASURE_MAP_FLICKER] = m->has_map[RF_MEASURE_MAP_BLOCKS] = flicker;
     if (!error)
         return RF_OK;
+    RF_TRY(rf_progress("judging", 0.2));
     RfGrey exemplar = {m->exemplar_grey, m->exemplar.width, m->exemplar.height};
     RF_TRY(rf_measure_flow_error(m->options.estimator, &pair, m->displacement, m->exemplar_grey ? &exemplar : NULL,
                                  m->maps[RF_MEASURE_MAP_FLOW_ERROR], m->maps[RF_MEASURE_MAP_MOTION], &out->flow));
@@ -333,7 +349,7 @@ static RfResult judge_motion(RfMeasure *m, const RfFlowView *flow, const Frame *
 
 // Crops without holes, if there are any: a filled hole is smooth, and its rim is not, which shows in the frequencies
 // that the texture does not have.
-static RfResult judge_spectrum(RfMeasure *m, const Frame *now, RfMeasureFrame *out)
+static RfResult judge_spectrum(RfMeasure *m, const Frame *now, RfRadialSpectrum *spectrum, RfMeasureFrame *out)
 {
     RfGrey frame = {now->grey, m->width, m->height};
     RfGrey exemplar = {m->exemplar_grey, m->exemplar.width, m->exemplar.height};
@@ -341,12 +357,12 @@ static RfResult judge_spectrum(RfMeasure *m, const Frame *now, RfMeasureFrame *o
     if (!m->spectrometer)
         RF_TRY(rf_spectrometer_create(m->exemplar_grey ? &exemplar : NULL, &frame, mask, m->options.spectrum_crop,
                                       m->options.spectrum_first, m->options.seed, &m->spectrometer));
-    RF_TRY(rf_spectrometer_measure(m->spectrometer, &frame, now->all_known ? NULL : now->known, &m->spectrum,
-                                   &out->spectrum));
+    RF_TRY(
+        rf_spectrometer_measure(m->spectrometer, &frame, now->all_known ? NULL : now->known, spectrum, &out->spectrum));
     bool some = out->coverage.holes > 0 && out->coverage.holes < out->coverage.fluid;
-    if (!some || !isnan(m->spectrum.power[1]))
+    if (!some || !isnan(spectrum->power[1]))
         return RF_OK;
-    return rf_spectrometer_measure(m->spectrometer, &frame, mask, &m->spectrum, &out->spectrum);
+    return rf_spectrometer_measure(m->spectrometer, &frame, mask, spectrum, &out->spectrum);
 }
 
 // Colour alone, or grey, packed: what windows are compared in.
@@ -396,10 +412,13 @@ static RfResult judge_patches(RfMeasure *m, const RfImageView *frame, const Fram
     if (!m->patches)
         RF_TRY(make_patches(m, channels));
     RfImageView packed;
+    int64_t use[RF_MEASURE_USE_CELLS * RF_MEASURE_USE_CELLS];
     RF_TRY(pack_new(frame, now->grey, channels, &packed));
     RfResult result =
         rf_patches_measure(m->patches, &packed, now->all_known ? NULL : now->known, m->maps[RF_MEASURE_MAP_PATCH],
-                           m->maps[RF_MEASURE_MAP_SOURCE], m->use, &out->patch);
+                           m->maps[RF_MEASURE_MAP_SOURCE], use, &out->patch);
+    if (result == RF_OK)
+        memcpy(m->use, use, sizeof use);
     m->has_map[RF_MEASURE_MAP_PATCH] = m->has_map[RF_MEASURE_MAP_SOURCE] = result == RF_OK;
     rf_release(packed.pixels);
     return result;
@@ -411,7 +430,39 @@ static void judge_contrast(const RfMeasure *m, const RfImageView *frame, const F
         return;
     rf_measure_contrast(frame, now->all_known ? NULL : now->known, &m->exemplar, &out->contrast);
     out->contrast.luma_floor = m->contrast_floor.luma_floor;
+    out->contrast.brightness_floor = m->contrast_floor.brightness_floor;
+    out->contrast.l1_floor = m->contrast_floor.l1_floor;
     out->contrast.mover_floor = m->contrast_floor.mover_floor;
+}
+
+static RfResult judge_flow(const RfFlowView *flow, RfMeasureFrame *out)
+{
+    RfMeasureDivergence divergence;
+    RF_TRY(rf_measure_divergence(flow, &divergence));
+    out->divergence = divergence.relative;
+    return RF_OK;
+}
+
+// Everything that may fail. The patches come last and go on with the fractions of "judging".
+static RfResult judge(RfMeasure *m, const RfFlowView *flow, const uint8_t *mask, const RfImageView *frame,
+                      RfRadialSpectrum *spectrum, RfMeasureFrame *out)
+{
+    Frame *now = &m->frames[m->current];
+    rf_measure_clear(out);
+    memset(m->has_map, 0, sizeof m->has_map);
+    RF_TRY(rf_progress("judging", 0));
+    find_fluid(m, flow, mask);
+    RF_TRY(take_frame(m, frame, now, &out->coverage));
+    if (flow)
+        RF_TRY(judge_flow(flow, out));
+    if (flow && m->frames_seen > 0)
+        RF_TRY(judge_motion(m, flow, &m->frames[1 - m->current], now, out));
+    RF_TRY(rf_progress("judging", 0.5));
+    RF_TRY(judge_spectrum(m, now, spectrum, out));
+    RF_TRY(rf_progress("judging", 0.6));
+    RF_TRY(judge_patches(m, frame, now, out));
+    judge_contrast(m, frame, now, out);
+    return RF_OK;
 }
 
 static void add_spectrum(RfMeasure *m)
@@ -428,31 +479,28 @@ RfResult rf_measure_step(RfMeasure *m, const RfFlowView *flow, const uint8_t *ma
 {
     RF_REQUIRE(m && frame && frame->pixels && out, "rf_measure_step: measure, frame or out is NULL");
     RF_TRY(check_frame(m, flow, frame));
-    RF_TRY(rf_progress("judging", 0));
-    if (!m->width)
-        RF_TRY(make_frames(m, frame));
-    Frame *now = &m->frames[m->current], *before = &m->frames[1 - m->current];
-    RfMeasureFrame result;
-    rf_measure_clear(&result);
-    memset(m->has_map, 0, sizeof m->has_map);
-    find_fluid(m, flow, mask);
-    RF_TRY(take_frame(m, frame, now, &result.coverage));
-    bool moved = flow && m->frames_seen > 0;
-    if (moved)
-        RF_TRY(judge_motion(m, flow, before, now, &result));
-    RF_TRY(judge_spectrum(m, now, &result));
-    RF_TRY(judge_patches(m, frame, now, &result));
-    judge_contrast(m, frame, now, &result);
-
-    // From here on nothing fails.
-    result.index = (double)m->frames_seen++;
-    m->pairs_seen += moved;
+    RfMeasureFrame judged;
+    RfRadialSpectrum spectrum;
+    RfResult result = m->width ? RF_OK : make_frames(m, frame);
+    if (result == RF_OK)
+        result = judge(m, flow, mask, frame, &spectrum, &judged);
+    if (result != RF_OK)
+    {
+        memset(m->has_map, 0, sizeof m->has_map);
+        if (m->frames_seen == 0)
+            forget_frames(m);
+        return result;
+    }
+    judged.index = (double)m->frames_seen;
+    m->pairs_seen += flow && m->frames_seen > 0;
+    ++m->frames_seen;
     m->timed = flow != NULL;
     m->time = flow ? flow->time : 0;
     m->current = 1 - m->current;
+    m->spectrum = spectrum;
     add_spectrum(m);
-    rf_measure_tally(&m->tally, &result);
-    *out = result;
+    rf_measure_tally(&m->tally, &judged);
+    *out = judged;
     return RF_OK;
 }
 

@@ -16,6 +16,7 @@
 
 #include "core/maths.h"
 #include "core/memory.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "kernels/cubic_spline.h"
 #include "kernels/neighbours.h"
@@ -48,7 +49,7 @@ struct RfPatchJudge
     RfWindowDatabase *database;
     /// Of the exemplar's own windows.
     Grid grid;
-    double floor;
+    double floor, share_floor;
 };
 
 // ---- grids of windows --------------------------------------------------------------------------------------------
@@ -217,6 +218,54 @@ static RfResult search_grid(const RfWindowDatabase *database, const RfImageView 
     return result;
 }
 
+// Centre of a matched window, in exemplar pixels.
+static RfVec2 source_of(const RfPatchJudge *judge, RfWindowPlace place)
+{
+    const float *m = judge->to_exemplar[place.copy], half = 0.5f * (float)(judge->size - 1);
+    float x = (float)place.x + half, y = (float)place.y + half;
+    return (RfVec2){m[0] * x + m[1] * y + m[2], m[3] * x + m[4] * y + m[5]};
+}
+
+// Cells divide the places that corners can have, not the pixels: those are fewer by a window.
+static int cell_of(float centre, int side, int size)
+{
+    float corner = centre - 0.5f * (float)(size - 1);
+    return rf_clamp_int((int)floorf((corner + 1e-3f) * CELLS / (float)(side - size + 1)), 0, CELLS - 1);
+}
+
+static double effective_share(const int64_t *counts, int64_t total)
+{
+    double entropy = 0;
+    for (int i = 0; i < CELLS * CELLS; ++i)
+        if (counts[i])
+        {
+            double p = (double)counts[i] / (double)total;
+            entropy -= p * log(p);
+        }
+    return total ? exp(entropy) / (CELLS * CELLS) : (double)NAN;
+}
+
+// What the matches of a grid are: residual, share and number of those that have one.
+static void count_matches(const RfPatchJudge *judge, const Grid *grid, const RfWindowMatch *matches, int64_t *counts,
+                          RfMeasurePatch *out)
+{
+    double squares = 0;
+    int64_t total = 0;
+    memset(counts, 0, CELLS * CELLS * sizeof *counts);
+    for (int i = 0; i < grid->count; ++i)
+    {
+        if (matches[i].candidate < 0)
+            continue;
+        RfVec2 p = source_of(judge, matches[i].place);
+        ++counts[cell_of(p.y, judge->height, judge->size) * CELLS + cell_of(p.x, judge->width, judge->size)];
+        squares += (double)matches[i].distance;
+        ++total;
+    }
+    out->windows = (double)total;
+    out->residual = levels(squares, (double)total, rf_windows_numbers(judge->database));
+    out->share = effective_share(counts, total);
+}
+
 // The exemplar against itself.
 static RfResult find_floor(RfPatchJudge *judge, const RfImageView *exemplar)
 {
@@ -228,31 +277,35 @@ static RfResult find_floor(RfPatchJudge *judge, const RfImageView *exemplar)
         own[i] = (RfWindowPlace){0, grid->corners[i][0], grid->corners[i][1]};
     if (result == RF_OK)
         result = search_grid(judge->database, exemplar, judge->size, grid, own, matches);
-    double squares = 0, windows = 0;
-    for (int i = 0; i < grid->count && result == RF_OK; ++i)
-        if (matches[i].candidate >= 0)
-        {
-            squares += (double)matches[i].distance;
-            windows += 1;
-        }
-    judge->floor = levels(squares, windows, rf_windows_numbers(judge->database));
+    if (result == RF_OK)
+    {
+        int64_t counts[CELLS * CELLS];
+        RfMeasurePatch own_matches;
+        count_matches(judge, grid, matches, counts, &own_matches);
+        judge->floor = own_matches.residual;
+        judge->share_floor = own_matches.share;
+    }
     rf_release(own);
     rf_release(matches);
     return result;
 }
 
-RfResult rf_patches_create(const RfImageView *exemplar, int size, int stride, int rotations, bool half_pixel,
-                           RfPatchJudge **out)
+RfResult rf_patches_check(int width, int height, int size, int rotations, bool half_pixel)
 {
-    *out = NULL;
-    int64_t candidates =
-        windows_at_stride(exemplar->width, exemplar->height, size, 1) * rotations * (half_pixel ? 4 : 1);
+    int64_t candidates = windows_at_stride(width, height, size, 1) * rotations * (half_pixel ? 4 : 1);
     if (candidates > RF_MAX_WINDOW_CANDIDATES)
         return rf_fail(
             RF_UNSUPPORTED, NULL, "patch distance",
             "%lld windows of the exemplar in all its copies, at most %d are possible: take fewer rotations, a "
             "smaller exemplar, or patch-every 0",
             (long long)candidates, RF_MAX_WINDOW_CANDIDATES);
+    return RF_OK;
+}
+
+RfResult rf_patches_create(const RfImageView *exemplar, int size, int stride, int rotations, bool half_pixel,
+                           RfPatchJudge **out)
+{
+    *out = NULL;
     RfPatchJudge *judge = rf_allocate_zero(1, sizeof *judge);
     if (!judge)
         return RF_OUT_OF_MEMORY;
@@ -287,53 +340,6 @@ void rf_patches_destroy(RfPatchJudge *judge)
 }
 
 // ---- frame to exemplar -------------------------------------------------------------------------------------------
-
-// Centre of a matched window, in exemplar pixels.
-static RfVec2 source_of(const RfPatchJudge *judge, RfWindowPlace place)
-{
-    const float *m = judge->to_exemplar[place.copy], half = 0.5f * (float)(judge->size - 1);
-    float x = (float)place.x + half, y = (float)place.y + half;
-    return (RfVec2){m[0] * x + m[1] * y + m[2], m[3] * x + m[4] * y + m[5]};
-}
-
-// Cells divide the places that corners can have, not the pixels: those are fewer by a window.
-static int cell_of(float centre, int side, int size)
-{
-    float corner = centre - 0.5f * (float)(size - 1);
-    return rf_clamp_int((int)floorf((corner + 1e-3f) * CELLS / (float)(side - size + 1)), 0, CELLS - 1);
-}
-
-static double effective_share(const int64_t *counts, int64_t total)
-{
-    double entropy = 0;
-    for (int i = 0; i < CELLS * CELLS; ++i)
-        if (counts[i])
-        {
-            double p = (double)counts[i] / (double)total;
-            entropy -= p * log(p);
-        }
-    return total ? exp(entropy) / (CELLS * CELLS) : (double)NAN;
-}
-
-static void count_matches(const RfPatchJudge *judge, const Grid *grid, const RfWindowMatch *matches, int64_t *counts,
-                          RfMeasurePatch *out)
-{
-    double squares = 0;
-    int64_t total = 0;
-    memset(counts, 0, CELLS * CELLS * sizeof *counts);
-    for (int i = 0; i < grid->count; ++i)
-    {
-        if (matches[i].candidate < 0)
-            continue;
-        RfVec2 p = source_of(judge, matches[i].place);
-        ++counts[cell_of(p.y, judge->height, judge->size) * CELLS + cell_of(p.x, judge->width, judge->size)];
-        squares += (double)matches[i].distance;
-        ++total;
-    }
-    out->windows = (double)total;
-    out->residual = levels(squares, (double)total, rf_windows_numbers(judge->database));
-    out->share = effective_share(counts, total);
-}
 
 // Each pixel holds what the window nearest to it has.
 static void draw_maps(const RfPatchJudge *judge, const Grid *grid, const RfWindowMatch *matches, int *window_at, int w,
@@ -435,7 +441,8 @@ static RfResult find_missing(const RfPatchJudge *judge, const RfImageView *frame
     for (int y = 0; y + overlap < frame->height && result == RF_OK; y += rows)
     {
         RfWindowSource strip;
-        if (cut_strip(judge, frame, known, y, rf_min_int(y + rows + overlap, frame->height), &strip))
+        result = rf_progress("judging", 0.7 + 0.3 * y / frame->height);
+        if (result == RF_OK && cut_strip(judge, frame, known, y, rf_min_int(y + rows + overlap, frame->height), &strip))
             result = search_strip(judge, &strip, windows, matches, least);
     }
     for (size_t i = 0; i < count && result == RF_OK; ++i)
@@ -475,7 +482,13 @@ RfResult rf_patches_measure(RfPatchJudge *judge, const RfImageView *frame, const
 {
     double nan = (double)NAN;
     Grid grid;
-    *out = (RfMeasurePatch){nan, nan, nan, judge->floor, nan, nan, 0};
+    *out = (RfMeasurePatch){.residual = nan,
+                            .missing = nan,
+                            .share = nan,
+                            .share_floor = judge->share_floor,
+                            .floor = judge->floor,
+                            .ratio = nan,
+                            .missing_ratio = nan};
     RfResult result = make_grid(frame->width, frame->height, known, judge->size, judge->stride, &grid);
     if (result == RF_OK)
         result = judge_grid(judge, frame, known, &grid, residual_map, source_map, counts, out);

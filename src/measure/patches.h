@@ -6,8 +6,11 @@
 
 typedef struct RfPatchJudge RfPatchJudge;
 
+/// RF_UNSUPPORTED if the exemplar has more windows, in all its copies, than can be searched.
+RfResult rf_patches_check(int width, int height, int size, int rotations, bool half_pixel);
+
 /// Windows `size` pixels wide; for stride, rotations and half_pixel see RfMeasureOptions. The exemplar is 1 or 3
-/// packed channels, 0 to 1, and copied; both sides are `size` or more.
+/// packed channels, 0 to 1, and copied; both sides are `size` or more; rf_patches_check has passed.
 RfResult rf_patches_create(const RfImageView *exemplar, int size, int stride, int rotations, bool half_pixel,
                            RfPatchJudge **out);
 void rf_patches_destroy(RfPatchJudge *judge);

@@ -81,7 +81,7 @@ static void displace_rows(void *context, int y0, int y1, int worker)
     const Displace *d = context;
     float sx = (float)d->view->width / (float)d->w, sy = (float)d->view->height / (float)d->h;
     double span = d->view->time - d->from;
-    // More than 64 frames at once are no frames of one film: the paths are then only roughly right.
+    // More than 32 frames at once are no frames of one film: the paths are then only roughly right.
     int steps = 2 * (span > 32 ? 32 : rf_max_int((int)ceil(span), 1));
     for (int y = y0; y < y1; ++y)
         for (int x = 0; x < d->w; ++x)

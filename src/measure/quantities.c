@@ -44,8 +44,10 @@ static const RfMeasureQuantity g_quantities[] = {
      "Rms residual of the frame's windows to their nearest exemplar windows."},
     {"patch-missing", "levels", AT(patch.missing), RF_MEASURE_LOWER_IS_BETTER, "patch-floor",
      "Rms residual of the exemplar's windows to their nearest frame windows."},
-    {"patch-share", "", AT(patch.share), RF_MEASURE_HIGHER_IS_BETTER, NULL,
+    {"patch-share", "", AT(patch.share), RF_MEASURE_HIGHER_IS_BETTER, "patch-share-floor",
      "Effective fraction of the exemplar that the frame's windows come from."},
+    {"patch-share-floor", "", AT(patch.share_floor), RF_MEASURE_NEUTRAL, NULL,
+     "The same for the exemplar's windows and its other, not overlapping ones."},
     {"patch-floor", "levels", AT(patch.floor), RF_MEASURE_NEUTRAL, NULL,
      "Rms residual of the exemplar's windows to its other, not overlapping ones."},
     {"patch-ratio", "", AT(patch.ratio), RF_MEASURE_LOWER_IS_BETTER, NULL, "Patch residual over its floor."},
@@ -62,16 +64,23 @@ static const RfMeasureQuantity g_quantities[] = {
     {"contrast-3", "", AT(contrast.channel[2]), RF_MEASURE_ONE_IS_BEST, NULL, "The same, third channel."},
     {"brightness", "levels", AT(contrast.brightness), RF_MEASURE_ZERO_IS_BEST, NULL,
      "Difference of the mean greys, frame minus exemplar."},
+    {"brightness-floor", "levels", AT(contrast.brightness_floor), RF_MEASURE_NEUTRAL, NULL,
+     "Mean size of that difference between crops of the exemplar and the whole."},
     {"histogram", "levels", AT(contrast.histogram_mover), RF_MEASURE_LOWER_IS_BETTER, "histogram-floor",
      "Earth mover's distance of the histograms of grey."},
     {"histogram-floor", "levels", AT(contrast.mover_floor), RF_MEASURE_NEUTRAL, NULL,
      "The same of crops of the exemplar against the whole."},
-    {"histogram-l1", "", AT(contrast.histogram_l1), RF_MEASURE_LOWER_IS_BETTER, NULL,
+    {"histogram-l1", "", AT(contrast.histogram_l1), RF_MEASURE_LOWER_IS_BETTER, "histogram-l1-floor",
      "Part of the pixels that would have to change their grey: half the L1 distance over 64 bins."},
+    {"histogram-l1-floor", "", AT(contrast.l1_floor), RF_MEASURE_NEUTRAL, NULL,
+     "The same of crops of the exemplar against the whole."},
 
     {"fluid", "px", AT(coverage.fluid), RF_MEASURE_NEUTRAL, NULL, "Pixels in the fluid."},
     {"holes", "px", AT(coverage.holes), RF_MEASURE_LOWER_IS_BETTER, NULL, "Fluid pixels with no texture."},
     {"holes-share", "", AT(coverage.share), RF_MEASURE_LOWER_IS_BETTER, NULL, "Their part of the fluid."},
+
+    {"divergence", "", AT(divergence), RF_MEASURE_LOWER_IS_BETTER, NULL,
+     "Of the flow itself, its rms over the rms speed: the part of its speed that a cell gains or loses."},
 };
 
 enum
