@@ -128,15 +128,10 @@ static void another_run_is_not_resumed(void **state)
     (void)state;
     TestFolder folder = test_folder_make();
     stop_somewhere(&folder);
-    static const char *const others[] = {"--seed 2",
-                                         "--size 64x64",
-                                         "--fade 2",
-                                         "--method warp",
-                                         "--method sprites",
-                                         "--velocity-scale 2",
-                                         "--fps 25",
-                                         "--map rough=builtin:noise?size=64",
-                                         "--preset paper"};
+    static const char *const others[] = {
+        "--seed 2",         "--size 64x64",       "--fade 2", "--method warp",
+        "--method sprites", "--velocity-scale 2", "--fps 25", "--map rough=builtin:noise?size=64",
+        "--preset paper"};
     for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i)
     {
         char line[512];
