@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/maths.h"
-#include "riffle/riffle.h"
 #include "measure/judgement.h"
+#include "riffle/riffle.h"
 #include "support/scenes.h"
 
 #include <setjmp.h>
