@@ -4,6 +4,7 @@
 #include "measure/judgement.h"
 #include "methods/lagrangian/lagrangian.h"
 #include "riffle/riffle.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 
 #include <setjmp.h>
@@ -126,7 +127,8 @@ static void check_scene(RfFlow *flow, SceneMoments *scene, const RfExemplar *exe
     RfLagrangian *lagrangian = make(exemplar, options_of(radius, RF_BLEND_CONTRAST));
     RfImageView frame = view_of(g_frame, width, height, 3);
     int born = 0, retired = 0;
-    for (int f = 1; f <= 300; ++f)
+    int frames = TEST_SANITIZED ? 75 : 300;
+    for (int f = 1; f <= frames; ++f)
     {
         RfFlowView view = {0};
         if (flow)

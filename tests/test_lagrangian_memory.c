@@ -3,6 +3,7 @@
 // than after three hundred, and it survives being given nothing.
 #include "core/random.h"
 #include "riffle/riffle.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 
 #include <execinfo.h>
@@ -16,13 +17,8 @@
 
 #include <cmocka.h>
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define SANITIZED
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
-#define SANITIZED
+#if TEST_SANITIZED || !defined(__GLIBC__)
+#define NO_HEAP_COUNT
 #endif
 
 enum
@@ -41,7 +37,7 @@ static atomic_int g_calls;
 static void *g_culprit[MAX_FRAMES];
 static int g_culprit_depth;
 
-#ifndef SANITIZED
+#ifndef NO_HEAP_COUNT
 // Seen by shared libraries too, so that those of the thread library count.
 #define EVERYWHERE __attribute__((visibility("default")))
 
@@ -140,7 +136,7 @@ static int run_counting(RfLagrangian *lagrangian, SceneMoments *moments, int fir
 static void a_steady_step_takes_nothing_from_the_heap(void **state)
 {
     (void)state;
-#ifdef SANITIZED
+#ifdef NO_HEAP_COUNT
     print_message("skipped: the heap belongs to a sanitizer, or is not the GNU one\n");
     skip();
 #endif
