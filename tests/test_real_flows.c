@@ -3,6 +3,7 @@
 // are there, and the built-in ones with obstacles. Frames are small; the radius is an eighth of the shorter side.
 #include "riffle/riffle.h"
 #include "support/files.h"
+#include "support/sanitized.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,7 +14,7 @@
 
 enum
 {
-    FRAMES = 300
+    FRAMES = TEST_SANITIZED ? 40 : 300
 };
 
 static RfExemplar *make_exemplar(const char *name)
