@@ -4,6 +4,7 @@
 // Each criterion is shown to fail on inputs made to fail it. Every test prints its numbers.
 #include "measure/judgement.h"
 #include "riffle/riffle.h"
+#include "support/sanitized.h"
 #include "support/scenes.h"
 
 #include <math.h>
@@ -353,6 +354,11 @@ static double warped_spectrum_ratio(const Subject *s)
 static void a_texture_warped_for_ever_fails_the_spectrum_criterion_by_frame_200(void **state)
 {
     (void)state;
+    if (TEST_SANITIZED)
+    {
+        print_message("skipped: it judges pictures, which sanitizers do not change, for minutes\n");
+        skip();
+    }
     for (int i = 0; i < EXEMPLARS; ++i)
     {
         double ratio = warped_spectrum_ratio(&g_subjects[i]);
