@@ -211,23 +211,6 @@ static void directions_turn_with_the_texture(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
-static void any_number_of_threads_gives_the_same_bytes(void **state)
-{
-    (void)state;
-    RfExemplar *exemplar = scene_noise_exemplar(64, 1);
-    for (int threads = 1; threads <= 5; threads += 2)
-    {
-        rf_set_threads(threads);
-        RfWarp *warp = make(exemplar);
-        run(warp, scene_two_vortices, 0, 10, g_first, threads == 1 ? g_other : g_last);
-        rf_warp_destroy(warp);
-        if (threads > 1)
-            assert_memory_equal(g_last, g_other, sizeof g_last);
-    }
-    rf_set_threads(0);
-    rf_exemplar_destroy(exemplar);
-}
-
 static void a_loaded_state_goes_on_with_the_same_bytes_and_a_wrong_one_is_refused(void **state)
 {
     (void)state;
@@ -310,28 +293,6 @@ static void what_cannot_be_followed_is_refused_and_leaves_the_frame(void **state
     rf_exemplar_destroy(exemplar);
 }
 
-static void blowing_up(int w, int h, double frame, float *velocity)
-{
-    (void)frame;
-    for (int k = 0; k < w * h; ++k)
-    {
-        velocity[2 * k] = k % 7 == 0 ? 1e30f : -1e20f;
-        velocity[2 * k + 1] = k % 5 == 0 ? -1e30f : 3;
-    }
-}
-
-static void absurd_speeds_give_finite_pixels(void **state)
-{
-    (void)state;
-    RfExemplar *exemplar = constant_exemplar(RF_TILING_NO);
-    RfWarp *warp = make(exemplar);
-    run(warp, blowing_up, 0, 3, g_first, g_last);
-    for (int k = 0; k < 3 * PIXELS; ++k)
-        assert_true(fabsf(g_last[k] - (0.2f + 0.3f * (float)(k % 3))) < 1e-4f);
-    rf_warp_destroy(warp);
-    rf_exemplar_destroy(exemplar);
-}
-
 static void the_table_of_options_needs_no_count(void **state)
 {
     (void)state;
@@ -350,11 +311,9 @@ int main(void)
         cmocka_unit_test(the_texture_follows_an_unsteady_flow_and_keeps_its_contrast),
         cmocka_unit_test(land_is_black_and_the_fluid_beside_it_is_not),
         cmocka_unit_test(directions_turn_with_the_texture),
-        cmocka_unit_test(any_number_of_threads_gives_the_same_bytes),
         cmocka_unit_test(a_loaded_state_goes_on_with_the_same_bytes_and_a_wrong_one_is_refused),
         cmocka_unit_test(a_state_saved_before_the_first_frame_loads),
         cmocka_unit_test(what_cannot_be_followed_is_refused_and_leaves_the_frame),
-        cmocka_unit_test(absurd_speeds_give_finite_pixels),
     };
     return cmocka_run_group_tests_name("warp", tests, NULL, NULL);
 }
