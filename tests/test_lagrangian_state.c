@@ -375,13 +375,13 @@ static void the_option_table_tells_the_defaults(void **state)
     for (int i = 0; i < count; ++i)
     {
         const uint8_t *field = (const uint8_t *)&options + table[i].offset;
-        float f;
-        int n;
-        uint64_t u;
-        memcpy(&f, field, sizeof f);
-        memcpy(&n, field, sizeof n);
-        memcpy(&u, field, sizeof u);
-        double value = table[i].kind == RF_OPTION_FLOAT ? (double)f : table[i].kind == RF_OPTION_UINT64 ? (double)u : n;
+        double value = 0;
+        if (table[i].kind == RF_OPTION_FLOAT)
+            value = *(const float *)(const void *)field;
+        else if (table[i].kind == RF_OPTION_UINT64)
+            value = (double)*(const uint64_t *)(const void *)field;
+        else
+            value = *(const int *)(const void *)field;
         assert_true(fabs(value - table[i].default_value) < 1e-6 * fabs(value) + 1e-12);
     }
     RfLagrangianOptions paper = rf_lagrangian_paper();
