@@ -8,6 +8,7 @@
 #include "eulerian.h"
 #include "io.h"
 #include "lagrangian.h"
+#include "optimize.h"
 #include "measure.h"
 #include "render.h"
 #include "sprites.h"

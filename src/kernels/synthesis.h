@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Texture optimisation: windows of a frame look for their like in the exemplar, and the frame is made anew from what
+// they found, in turn, until they agree.
+//
+// Kwatra, Essa, Bobick, Kwatra. Texture optimization for example-based synthesis. 2005 (energy, search and assign).
+// Han, Zhou, Wei, Gong, Bao, Zhang, Guo. Fast example-based surface texture synthesis via discrete optimization. 2006
+// (k-coherent candidates; a pixel becomes one of the candidates, not their mean).
+#pragma once
+
+#include "kernels/fixed_picture.h"
+#include "kernels/neighbours.h"
+#include "kernels/similar.h"
+#include "kernels/usage.h"
+
+enum
+{
+    /// Beyond an exemplar's borders, so that windows of one that tiles need no test.
+    RF_SYNTHESIS_APRON = RF_FIXED_SIDE
+};
+
+/// One level of an exemplar: what windows are compared with.
+typedef struct RfSynthesisExemplar
+{
+    int width, height, channels;
+    bool tiles;
+    /// [height][width][channels], in the unit of comparison: squared differences are summed as they are.
+    float *pixels;
+    /// The same times `scale`.
+    RfFixedPicture fixed;
+    float scale;
+    RfSimilar similar;
+} RfSynthesisExemplar;
+
+/// A window of the frame and what it found. Positions are pixel indices: a pixel's centre is a whole number.
+typedef struct RfSynthesisWindow
+{
+    /// Of its centre, in the frame and in the exemplar.
+    RfVec2 at, source;
+    /// How the exemplar lies in the frame: from `at`, a step d in the frame is the step turn * d in the exemplar, both
+    /// as complex numbers. (1, 0): as it is.
+    RfVec2 turn;
+    /// Sum of squared differences when it was last compared, in fixed-point units.
+    float cost;
+    bool exists;
+    /// Its match or its cost are others than before the last search.
+    bool changed;
+} RfSynthesisWindow;
+
+/// A frame in the making. It is cut into cells of `spacing` pixels, each with one window at most.
+typedef struct RfSynthesisFrame
+{
+    int width, height;
+    bool tiles;
+    int spacing, columns, rows;
+    RfSynthesisWindow *windows;
+    /// Of cells: a pixel became another in the last assignment.
+    uint8_t *stirred;
+    /// [height][width]: where each pixel comes from in the exemplar.
+    RfVec2 *sources;
+    /// What the pixels look like, in the unit of comparison and fixed point.
+    RfFixedPicture picture;
+} RfSynthesisFrame;
+
+static inline RfVec2 rf_turn(RfVec2 turn, RfVec2 step)
+{
+    return (RfVec2){turn.x * step.x - turn.y * step.y, turn.x * step.y + turn.y * step.x};
+}
+
+/// The step back: rf_turn(turn, rf_turn_back(turn, step)) is step.
+static inline RfVec2 rf_turn_back(RfVec2 turn, RfVec2 step)
+{
+    float square = turn.x * turn.x + turn.y * turn.y;
+    return rf_turn((RfVec2){turn.x / square, -turn.y / square}, step);
+}
+
+/// Takes over `pixels`, also on failure. coarse: the level of half the size, or NULL. similar: places a list.
+RfResult rf_synthesis_exemplar_create(float *pixels, int width, int height, int channels, bool tiles, float scale,
+                                      int similar, const RfSynthesisExemplar *coarse, RfSynthesisExemplar *out);
+void rf_synthesis_exemplar_free(RfSynthesisExemplar *exemplar);
+
+/// No windows, and no sources: all (0, 0).
+RfResult rf_synthesis_frame_create(int width, int height, int channels, bool tiles, RfSynthesisFrame *out);
+void rf_synthesis_frame_free(RfSynthesisFrame *frame);
+/// Cuts the frame into cells of `spacing`, without windows.
+RfResult rf_synthesis_cut(RfSynthesisFrame *frame, int spacing);
+/// A window in the middle of every cell; it lies as `turns` ([height][width], NULL: all (1, 0)) say there, and
+/// continues the frame's sources.
+void rf_synthesis_place(RfSynthesisFrame *frame, const RfVec2 *turns);
+/// Every window starts at a random place of the exemplar.
+void rf_synthesis_scatter(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int side, uint64_t seed);
+/// Doubles the sources of a coarser frame.
+void rf_synthesis_refine(const RfSynthesisFrame *coarse, RfSynthesisFrame *fine);
+/// Sets the picture from the sources, but for its last `guides` channels.
+void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int guides);
+
+typedef struct RfSynthesisSearch
+{
+    const RfSynthesisExemplar *exemplar;
+    RfSynthesisFrame *frame;
+    /// Of the windows, odd.
+    int side;
+    /// All windows of the exemplar, for the exact search; NULL: k-coherent candidates.
+    const RfWindowDatabase *windows;
+    /// [height][width] of the exemplar, for a window's centre, added to its cost; NULL: none.
+    const float *prices;
+    /// A window keeps its match unless another costs less than this part of it. 1: the best always.
+    float keep;
+    /// Whole pixels only, and nothing turned: the fast path.
+    bool plain;
+    /// Windows where nothing has changed too.
+    bool all;
+    uint64_t seed, round;
+} RfSynthesisSearch;
+
+/// Gives every window its match. *energy: the mean cost, in fixed-point units.
+RfResult rf_synthesis_search(const RfSynthesisSearch *search, double *energy);
+
+typedef struct RfSynthesisAssign
+{
+    const RfSynthesisExemplar *exemplar;
+    RfSynthesisFrame *frame;
+    int side;
+    /// A pixel becomes the mean of what its windows say, not one of them.
+    bool mean;
+    /// Windows that fit badly count less (energy with r = 0.8; else r = 2).
+    bool robust;
+    /// Offsets that differ by up to this, in exemplar pixels, are one: their mean is taken. 0 for still pictures.
+    float together;
+    /// Windows may lie anywhere in their cells.
+    bool carried;
+    /// Cells where nothing has changed too.
+    bool all;
+    /// Channels at the end of the picture that are given, not made.
+    int guides;
+    /// What pixels are held to and how strongly, against a weight of 1 of all windows over a pixel together:
+    /// [height][width]. NULL: to nothing.
+    const RfFixedPicture *held;
+    const float *hold;
+} RfSynthesisAssign;
+
+/// Makes sources and picture from the windows.
+RfResult rf_synthesis_assign(const RfSynthesisAssign *assign);

@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: Apache-2.0
+// The search step: every window of the frame looks for its like in the exemplar.
+//
+// The k-coherent search asks the pixels of the window where they come from. A pixel that comes from place s says that
+// the window's centre, d pixels away, should come from s - d; what is most like that place is a candidate too, and so
+// is one place picked at random. Only these are compared, in fixed point, whatever the exemplar's size. The exact
+// search (kernels/neighbours.h) compares with all.
+//
+// A window that reaches over the frame's border is compared as the nearest one that does not.
+#include "core/maths.h"
+#include "core/memory.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "core/result.h"
+#include "kernels/synthesis.h"
+
+#include <string.h>
+
+enum
+{
+    // Pixels asked, a side of the window.
+    ASKED = 5,
+    MAX_CANDIDATES = ASKED * ASKED * (1 + RF_MAX_SIMILAR) + 2,
+    // Of the table that keeps candidates apart; a power of two, at least twice as many.
+    TABLE = 512,
+    MAX_NUMBERS = RF_FIXED_SIDE * RF_FIXED_SIDE * RF_MAX_EXEMPLAR_CHANNELS,
+    // Windows that an exact search is given at once: 64 MiB of queries at most.
+    BATCH_NUMBERS = 1 << 24
+};
+
+typedef struct Candidates
+{
+    int count;
+    /// Of the windows' centres.
+    RfVec2 places[MAX_CANDIDATES];
+    const int16_t *corners[MAX_CANDIDATES];
+    float prices[MAX_CANDIDATES];
+    /// Of the places in use, 0: none.
+    uint32_t table[TABLE];
+    uint16_t used[MAX_CANDIDATES];
+} Candidates;
+
+typedef struct Scratch
+{
+    Candidates candidates;
+    int16_t window[MAX_NUMBERS + RF_FIXED_LANES];
+} Scratch;
+
+typedef struct Walk
+{
+    const RfSynthesisSearch *search;
+    RfFixedQuery query;
+    int half;
+    int asked[ASKED];
+    Scratch *scratch;
+    double *energy;
+    /// Of the windows that are searched exactly.
+    int first;
+    const int *list;
+    float *windows;
+} Walk;
+
+static void forget(Candidates *c)
+{
+    for (int i = 0; i < c->count; ++i)
+        c->table[c->used[i]] = 0;
+    c->count = 0;
+}
+
+static float bring_inside(float at, int n, int half, bool tiles)
+{
+    if (!tiles)
+        return rf_clamp(at, (float)half, (float)(n - 1 - half));
+    at -= floorf((at + 0.5f) / (float)n) * (float)n;
+    return at;
+}
+
+static int whole(float at)
+{
+    return (int)floorf(at + 0.5f);
+}
+
+// Adds the place unless its pixel is there already.
+static void add(const Walk *walk, Candidates *c, RfVec2 place)
+{
+    const RfSynthesisExemplar *e = walk->search->exemplar;
+    place = (RfVec2){bring_inside(place.x, e->width, walk->half, e->tiles),
+                     bring_inside(place.y, e->height, walk->half, e->tiles)};
+    int x = whole(place.x), y = whole(place.y);
+    uint32_t key = 1 + (uint32_t)y * (uint32_t)e->width + (uint32_t)x;
+    uint32_t slot = key * 2654435761u >> 23;
+    for (; c->table[slot]; slot = (slot + 1) % TABLE)
+        if (c->table[slot] == key)
+            return;
+    c->table[slot] = key;
+    c->used[c->count] = (uint16_t)slot;
+    c->places[c->count] = place;
+    c->corners[c->count] = rf_fixed_at(&e->fixed, x - walk->half, y - walk->half);
+    c->prices[c->count] = walk->search->prices ? walk->search->prices[(ptrdiff_t)y * e->width + x] : 0;
+    ++c->count;
+}
+
+static void add_similar(const Walk *walk, Candidates *c)
+{
+    const RfSimilar *similar = &walk->search->exemplar->similar;
+    int told = c->count;
+    for (int i = 0; i < told; ++i)
+    {
+        RfVec2 place = c->places[i];
+        int x = whole(place.x), y = whole(place.y);
+        const RfPlace *list = rf_similar_at(similar, x, y);
+        for (int k = 0; k < similar->count; ++k)
+            add(walk, c, (RfVec2){place.x + (float)(list[k].x - x), place.y + (float)(list[k].y - y)});
+    }
+}
+
+static void add_random(const Walk *walk, Candidates *c, int window)
+{
+    const RfSynthesisSearch *s = walk->search;
+    int margin = s->exemplar->tiles ? 0 : walk->half;
+    uint32_t width = (uint32_t)(s->exemplar->width - 2 * margin), height = (uint32_t)(s->exemplar->height - 2 * margin);
+    uint64_t item = (uint64_t)window;
+    add(walk, c,
+        (RfVec2){(float)(margin + (int)rf_random_below(width, s->seed, s->round, item, 0)),
+                 (float)(margin + (int)rf_random_below(height, s->seed, s->round, item, 1))});
+}
+
+// Where the window is compared: a whole pixel, and inside the frame by half a window.
+static RfVec2 compared_at(const Walk *walk, const RfSynthesisWindow *window)
+{
+    const RfSynthesisFrame *f = walk->search->frame;
+    int half = f->tiles ? 0 : walk->half;
+    return (RfVec2){(float)rf_clamp_int(whole(window->at.x), half, f->width - 1 - half),
+                    (float)rf_clamp_int(whole(window->at.y), half, f->height - 1 - half)};
+}
+
+static int frame_index(int i, int n, bool tiles)
+{
+    return tiles ? rf_wrap_int(i, n) : rf_clamp_int(i, 0, n - 1);
+}
+
+static void add_coherent(const Walk *walk, Candidates *c, const RfSynthesisWindow *window, RfVec2 at)
+{
+    const RfSynthesisFrame *f = walk->search->frame;
+    for (int j = 0; j < ASKED; ++j)
+        for (int i = 0; i < ASKED; ++i)
+        {
+            RfVec2 step = {(float)walk->asked[i], (float)walk->asked[j]};
+            RfVec2 point = rf_vec2_add(at, walk->search->plain ? step : rf_turn_back(window->turn, step));
+            int x = whole(point.x), y = whole(point.y);
+            RfVec2 source = f->sources[(ptrdiff_t)frame_index(y, f->height, f->tiles) * f->width +
+                                       frame_index(x, f->width, f->tiles)];
+            RfVec2 rest = rf_turn(window->turn, (RfVec2){point.x - (float)x, point.y - (float)y});
+            add(walk, c, rf_vec2_sub(rf_vec2_add(source, rest), step));
+        }
+}
+
+// The window's pixels, turned back into the exemplar's frame.
+static void gather(const Walk *walk, const RfSynthesisWindow *window, RfVec2 at, int16_t *out)
+{
+    const RfSynthesisFrame *f = walk->search->frame;
+    int channels = f->picture.channels;
+    for (int j = -walk->half; j <= walk->half; ++j)
+        for (int i = -walk->half; i <= walk->half; ++i, out += channels)
+        {
+            RfVec2 point = rf_vec2_add(at, rf_turn_back(window->turn, (RfVec2){(float)i, (float)j}));
+            memcpy(out,
+                   rf_fixed_at(&f->picture, frame_index(whole(point.x), f->width, f->tiles),
+                               frame_index(whole(point.y), f->height, f->tiles)),
+                   (size_t)channels * sizeof *out);
+        }
+}
+
+static RfFixedQuery query_of(const Walk *walk, const RfSynthesisWindow *window, RfVec2 at, Scratch *scratch)
+{
+    RfFixedQuery query = walk->query;
+    if (walk->search->plain)
+    {
+        query.window = rf_fixed_at(&walk->search->frame->picture, (int)at.x - walk->half, (int)at.y - walk->half);
+        return query;
+    }
+    gather(walk, window, at, scratch->window);
+    query.window = scratch->window;
+    query.stride = query.numbers;
+    return query;
+}
+
+// Takes the match.
+static void settle(RfSynthesisWindow *window, RfVec2 at, RfVec2 place, float cost)
+{
+    RfVec2 source = rf_vec2_sub(place, rf_turn(window->turn, rf_vec2_sub(at, window->at)));
+    window->changed = source.x != window->source.x || source.y != window->source.y || cost != window->cost;
+    window->source = source;
+    window->cost = cost;
+}
+
+static bool is_stirred(const RfSynthesisFrame *f, int column, int row, int reach)
+{
+    for (int j = row - reach; j <= row + reach; ++j)
+        for (int i = column - reach; i <= column + reach; ++i)
+        {
+            bool outside = i < 0 || j < 0 || i >= f->columns || j >= f->rows;
+            if (outside && !f->tiles)
+                continue;
+            if (f->stirred[rf_wrap_int(j, f->rows) * f->columns + rf_wrap_int(i, f->columns)])
+                return true;
+        }
+    return false;
+}
+
+// Of two, the best; of an own match and another, the own unless the other is better by the margin.
+static void search_window(const Walk *walk, RfSynthesisWindow *window, int index, Scratch *scratch)
+{
+    const RfSynthesisSearch *s = walk->search;
+    Candidates *c = &scratch->candidates;
+    RfVec2 at = compared_at(walk, window);
+    add(walk, c, rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at))));
+    add_coherent(walk, c, window, at);
+    add_similar(walk, c);
+    add_random(walk, c, index);
+    RfFixedQuery query = query_of(walk, window, at, scratch);
+    float cost = 0, own = 0;
+    int best = 0;
+    if (s->keep < 1)
+    {
+        rf_fixed_least(&query, c->corners, NULL, 1, &own);
+        best = 1 + rf_fixed_least(&query, c->corners + 1, c->prices + 1, c->count - 1, &cost);
+        if (c->count == 1 || cost + c->prices[best] >= s->keep * (own + c->prices[0]))
+        {
+            best = 0;
+            cost = own;
+        }
+    }
+    else
+        best = rf_fixed_least(&query, c->corners, c->prices, c->count, &cost);
+    settle(window, at, c->places[best], cost);
+    forget(c);
+}
+
+static void search_row(void *context, int row, int worker)
+{
+    const Walk *walk = context;
+    RfSynthesisFrame *f = walk->search->frame;
+    int reach = (walk->half + f->spacing - 1) / f->spacing;
+    double energy = 0;
+    for (int i = 0; i < f->columns; ++i)
+    {
+        RfSynthesisWindow *window = &f->windows[(ptrdiff_t)row * f->columns + i];
+        if (!window->exists)
+            continue;
+        window->changed = false;
+        if (walk->search->all || is_stirred(f, i, row, reach))
+            search_window(walk, window, row * f->columns + i, &walk->scratch[worker]);
+        energy += (double)window->cost;
+    }
+    walk->energy[row] = energy;
+}
+
+// ---- the exact search
+
+static void gather_exact(void *context, int item, int worker)
+{
+    const Walk *walk = context;
+    const RfSynthesisWindow *window = &walk->search->frame->windows[walk->list[walk->first + item]];
+    Scratch *scratch = &walk->scratch[worker];
+    int side = 2 * walk->half + 1, numbers = side * side * walk->search->frame->picture.channels;
+    gather(walk, window, compared_at(walk, window), scratch->window);
+    float *out = walk->windows + (size_t)item * (size_t)numbers;
+    float scale = 1 / walk->search->exemplar->scale;
+    for (int i = 0; i < numbers; ++i)
+        out[i] = scale * scratch->window[i];
+}
+
+// Prices are known by pixels, penalties by candidates: all whole windows, row by row.
+static float *make_penalties(const Walk *walk)
+{
+    const RfSynthesisExemplar *e = walk->search->exemplar;
+    float *penalties = rf_allocate((size_t)rf_windows_count(walk->search->windows), sizeof *penalties);
+    float unit = 1 / (e->scale * e->scale);
+    for (int i = 0; penalties && i < rf_windows_count(walk->search->windows); ++i)
+    {
+        RfWindowPlace place = rf_windows_place(walk->search->windows, i);
+        int x = place.x + walk->half, y = place.y + walk->half;
+        if (e->tiles)
+            x = rf_wrap_int(x, e->width), y = rf_wrap_int(y, e->height);
+        penalties[i] = unit * walk->search->prices[(ptrdiff_t)y * e->width + x];
+    }
+    return penalties;
+}
+
+static RfResult search_batch(Walk *walk, int count, const float *penalties, RfWindowMatch *matches)
+{
+    RfWindowQueries queries = {.count = count, .windows = walk->windows, .penalties = penalties};
+    rf_parallel_for(count, gather_exact, walk);
+    RF_TRY(rf_windows_search(walk->search->windows, &queries, matches));
+    float unit = walk->search->exemplar->scale * walk->search->exemplar->scale;
+    for (int i = 0; i < count; ++i)
+    {
+        RfSynthesisWindow *window = &walk->search->frame->windows[walk->list[walk->first + i]];
+        RfVec2 place = {(float)(matches[i].place.x + walk->half), (float)(matches[i].place.y + walk->half)};
+        settle(window, compared_at(walk, window), place, matches[i].distance * unit);
+        walk->energy[0] += (double)window->cost;
+    }
+    return RF_OK;
+}
+
+static RfResult search_all(Walk *walk, int *list, int count, int batch)
+{
+    RfWindowMatch *matches = rf_allocate((size_t)batch, sizeof *matches);
+    int numbers = rf_windows_numbers(walk->search->windows);
+    walk->windows = rf_allocate((size_t)batch * (size_t)numbers, sizeof *walk->windows);
+    float *penalties = walk->search->prices ? make_penalties(walk) : NULL;
+    bool enough = matches && walk->windows && (penalties || !walk->search->prices);
+    RfResult result = enough ? RF_OK : RF_OUT_OF_MEMORY;
+    walk->list = list;
+    for (walk->first = 0; walk->first < count && result == RF_OK; walk->first += batch)
+        result = search_batch(walk, rf_min_int(batch, count - walk->first), penalties, matches);
+    rf_release(matches);
+    rf_release(walk->windows);
+    rf_release(penalties);
+    return result;
+}
+
+static RfResult search_exactly(Walk *walk)
+{
+    const RfSynthesisFrame *f = walk->search->frame;
+    int cells = f->columns * f->rows, count = 0;
+    int *list = rf_allocate((size_t)cells, sizeof *list);
+    if (!list)
+        return RF_OUT_OF_MEMORY;
+    for (int i = 0; i < cells; ++i)
+        if (f->windows[i].exists)
+            list[count++] = i;
+    int batch = rf_clamp_int(BATCH_NUMBERS / rf_windows_numbers(walk->search->windows), 1, rf_max_int(count, 1));
+    RfResult result = search_all(walk, list, count, batch);
+    rf_release(list);
+    return result;
+}
+
+static int count_windows(const RfSynthesisFrame *f)
+{
+    int count = 0;
+    for (int i = 0; i < f->columns * f->rows; ++i)
+        count += f->windows[i].exists;
+    return count;
+}
+
+RfResult rf_synthesis_search(const RfSynthesisSearch *search, double *energy)
+{
+    RfSynthesisFrame *f = search->frame;
+    assert(search->side <= RF_FIXED_SIDE && search->side % 2 == 1);
+    assert(f->tiles || (search->side <= f->width && search->side <= f->height));
+    Walk walk = {.search = search, .half = search->side / 2};
+    int16_t mask[RF_FIXED_SIDE * RF_MAX_EXEMPLAR_CHANNELS + RF_FIXED_LANES];
+    rf_fixed_query(&f->picture, &search->exemplar->fixed, search->side, mask, &walk.query);
+    for (int i = 0; i < ASKED; ++i)
+        walk.asked[i] = (int)lrint((double)walk.half * (2 * i - (ASKED - 1)) / (ASKED - 1));
+    walk.scratch = rf_allocate_zero((size_t)rf_threads(), sizeof *walk.scratch);
+    walk.energy = rf_allocate_zero((size_t)f->rows, sizeof *walk.energy);
+    RfResult result = walk.scratch && walk.energy ? RF_OK : RF_OUT_OF_MEMORY;
+    if (result == RF_OK && search->windows)
+        result = search_exactly(&walk);
+    else if (result == RF_OK)
+        rf_parallel_for(f->rows, search_row, &walk);
+    double sum = 0;
+    for (int j = 0; j < f->rows && result == RF_OK; ++j)
+        sum += walk.energy[j];
+    *energy = sum / rf_max_int(count_windows(f), 1);
+    rf_release(walk.scratch);
+    rf_release(walk.energy);
+    return result;
+}

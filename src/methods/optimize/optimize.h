@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the still and the moving form of texture optimisation share.
+#pragma once
+
+#include "kernels/synthesis_material.h"
+#include "riffle/optimize.h"
+
+RfResult rf_optimize_check(const RfOptimizeOptions *options);
+/// Samples all made channels of the exemplar: the pixel at whole places, between them by a cubic that meets the pixels.
+/// turn: how directions lie in the frame, as in RfSynthesisWindow; NULL: as in the exemplar.
+void rf_optimize_sample(const RfSynthesisMaterial *material, RfVec2 source, const RfVec2 *turn, float *values);

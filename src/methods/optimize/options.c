@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/options.h"
+#include "core/result.h"
+#include "methods/optimize/optimize.h"
+
+static const RfOption g_options[] = {
+    {"seed", RF_OPTION_UINT64, offsetof(RfOptimizeOptions, seed), "", 0, 18446744073709551615.0, 1, NULL,
+     "Where the first windows start in the exemplar is drawn from it."},
+    {"levels", RF_OPTION_INT, offsetof(RfOptimizeOptions, levels), "", 0, RF_SYNTHESIS_LEVELS, 0, NULL,
+     "Levels of the pyramid; 0 picks them by the exemplar's size. More keep larger structures together."},
+    {"iterations", RF_OPTION_INT, offsetof(RfOptimizeOptions, iterations), "", 1, 100, 4, NULL,
+     "Search and assign steps with each window on the coarsest level; half as many on each finer one."},
+    {"form", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, form), "", 0, 1, RF_FORM_DISCRETE, "discrete|mean",
+     "A pixel becomes one of the exemplar's (sharp), or the mean of what its windows say (smooth)."},
+    {"spread", RF_OPTION_FLOAT, offsetof(RfOptimizeOptions, spread), "", 0, 100, 2, NULL,
+     "Price of using one place of the exemplar more than others; 0 lets the result collapse to what fits itself best."},
+    {"orient", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, orient), "", 0, 1, RF_ORIENT_NONE, "none|flow",
+     "The exemplar lies as it is, or its x axis points downstream."},
+    {"search", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, search), "", 0, 1, RF_SEARCH_COHERENCE, "exact|coherence",
+     "All windows of the exemplar on every level, or k-coherent candidates on all but the coarsest."},
+    {"similar", RF_OPTION_INT, offsetof(RfOptimizeOptions, similar), "", 1, RF_MAX_SIMILAR, 2, NULL,
+     "Similar places listed for every pixel of the exemplar, as candidates of the k-coherent search."},
+    {"tile", RF_OPTION_BOOL, offsetof(RfOptimizeOptions, tile), "", 0, 1, 0, NULL,
+     "The result continues across its own borders."},
+};
+
+enum
+{
+    OPTION_COUNT = sizeof g_options / sizeof *g_options
+};
+
+const RfOption *rf_optimize_option_table(int *count)
+{
+    if (count)
+        *count = OPTION_COUNT;
+    return g_options;
+}
+
+RfOptimizeOptions rf_optimize_defaults(void)
+{
+    return (RfOptimizeOptions){.struct_size = sizeof(RfOptimizeOptions),
+                               .seed = 1,
+                               .windows = {17, 9},
+                               .iterations = 4,
+                               .spread = 2,
+                               .search = RF_SEARCH_COHERENCE,
+                               .similar = 2};
+}
+
+RfResult rf_optimize_check(const RfOptimizeOptions *options)
+{
+    RF_TRY(rf_options_check(options, options->struct_size, sizeof *options, "rf_optimize_defaults", g_options,
+                            OPTION_COUNT));
+    RF_REQUIRE(options->windows[0], "windows: at least one is needed");
+    for (int i = 0; i < RF_MAX_OPTIMIZE_WINDOWS && options->windows[i]; ++i)
+        RF_REQUIRE(options->windows[i] >= 5 && options->windows[i] <= RF_FIXED_SIDE && options->windows[i] % 2 == 1,
+                   "windows: %d must be odd, 5 to %d", options->windows[i], RF_FIXED_SIDE);
+    return RF_OK;
+}
