@@ -2,7 +2,6 @@
 #include "core/random.h"
 #include "core/simd.h"
 #include "kernels/neighbours.h"
-#include "kernels/principal.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -28,6 +27,8 @@ typedef struct Scene
     // 0: smooth and noisy; 1: a few grey levels, many windows alike; 2: constant; 3: exact copies of candidates asked
     int kind;
     int components;
+    // Of the numbers; 0: as they are.
+    float size;
     float *pixels[MAX_COPIES], channel_weights[8], turns[MAX_COPIES][6], *penalty, *windows, *mask;
     uint8_t *valid[MAX_COPIES];
     RfWindowPlace exclusions[QUERIES];
@@ -54,7 +55,8 @@ static float value_at(const Scene *s, int copy, int x, int y, int k)
     if (s->kind == 1)
         return (float)((x / 7 + y / 5) % 3 == 0);
     float smooth = sinf(0.31f * (float)(x + 3 * k)) + cosf(0.23f * (float)(y - x) + (float)k);
-    return 100 + 20 * smooth + 10 * random_at(s, 1, k, y * s->width + x, s->width == s->height ? 0 : copy);
+    float value = 100 + 20 * smooth + 10 * random_at(s, 1, k, y * s->width + x, s->width == s->height ? 0 : copy);
+    return s->size > 0 ? value * s->size : value;
 }
 
 static void make_pictures(Scene *s)
@@ -240,9 +242,8 @@ static int slow_search(const Scene *s, double *least)
 }
 
 // The nearest by rounded arithmetic is the nearest in double, but for distances that differ by their rounding alone.
-static void expect_nearest(Scene *s)
+static void expect_nearest_in(const Scene *s)
 {
-    open_scene(s);
     static double least[QUERIES];
     RfWindowMatch matches[QUERIES];
     assert_int_equal(slow_search(s, least), rf_windows_count(s->database));
@@ -265,6 +266,12 @@ static void expect_nearest(Scene *s)
         if (score > least[q] + 2e-6 * (fabs(least[q]) + distance))
             fail_msg("query %d: %.9g at candidate %d, but there is %.9g", q, score, m->candidate, least[q]);
     }
+}
+
+static void expect_nearest(Scene *s)
+{
+    open_scene(s);
+    expect_nearest_in(s);
     close_scene(s);
 }
 
@@ -303,6 +310,68 @@ static void so_it_is_with_few_and_with_many_components(void **state)
     for (int components = 1; components <= RF_MAX_WINDOW_COMPONENTS; components += 21)
         expect_nearest(
             &(Scene){.width = 41, .height = 37, .channels = 2, .side = 9, .copies = 1, .components = components});
+}
+
+static void so_it_is_where_a_second_bound_sieves(void **state)
+{
+    (void)state;
+    // More than 32 components: those beyond are there for a second bound.
+    for (int components = 33; components <= 63; components += 10)
+        for (int side = 9; side <= 17; side += 8)
+            expect_nearest(&(Scene){.width = 37,
+                                    .height = 37,
+                                    .channels = side == 9 ? 3 : 1,
+                                    .side = side,
+                                    .copies = 2,
+                                    .components = components,
+                                    .penalties = components % 20 == 3,
+                                    .excluded = components > 50});
+}
+
+static void queries_may_be_larger_than_any_candidate(void **state)
+{
+    (void)state;
+    for (int components = 0; components <= 40; components += 40)
+    {
+        Scene s = {.width = 41, .height = 37, .channels = 2, .side = 9, .copies = 1, .components = components};
+        open_scene(&s);
+        // Some in a panel of 12, all in another, none in a third.
+        for (int q = 0; q < QUERIES; ++q)
+            for (int k = 0; k < 162 && q < 24 && (q >= 12 || q % 5 == 0); ++k)
+                s.windows[q * 162 + k] = (q % 2 ? 1000.0f : -3.0f) * s.windows[q * 162 + k];
+        expect_nearest_in(&s);
+        close_scene(&s);
+    }
+}
+
+static void penalties_may_be_out_of_proportion(void **state)
+{
+    (void)state;
+    const float sizes[] = {1e6f, 1e12f, 1e25f};
+    for (int i = 0; i < 3; ++i)
+    {
+        Scene s = {.width = 41, .height = 37, .channels = 2, .side = 9, .copies = 1, .penalties = true};
+        open_scene(&s);
+        for (int c = 0; c < rf_windows_count(s.database); ++c)
+            s.penalty[c] = c % 7 == 3 ? s.penalty[c] : sizes[i] * (random_at(&s, 6, c, 0, 0) - (i == 1));
+        expect_nearest_in(&s);
+        close_scene(&s);
+    }
+}
+
+static void pictures_may_be_tiny_or_huge(void **state)
+{
+    (void)state;
+    const float sizes[] = {1e-15f, 1e-9f, 1e9f};
+    for (int i = 0; i < 3; ++i)
+    {
+        Scene s = {.width = 41, .height = 37, .channels = 2, .side = 9, .copies = 1, .size = sizes[i]};
+        open_scene(&s);
+        for (int k = 0; k < QUERIES * 162; ++k)
+            s.windows[k] = s.windows[k] < 40 * sizes[i] ? 40 * sizes[i] : s.windows[k];
+        expect_nearest_in(&s);
+        close_scene(&s);
+    }
 }
 
 static void so_it_is_with_channel_weights(void **state)
@@ -499,9 +568,18 @@ static const char *g_program;
 static void print_matches(void)
 {
     for (int kind = 0; kind < 4; ++kind)
-        for (int known = 0; known < 2; ++known)
+        for (int variant = 0; variant < 5; ++variant)
         {
-            Scene s = {.width = 47, .height = 43, .channels = 3, .side = 9, .copies = 2, .kind = kind, .known = known};
+            Scene s = {.width = 47,
+                       .height = 43,
+                       .channels = 3,
+                       .side = variant == 4 ? 17 : 9,
+                       .copies = 2,
+                       .kind = kind,
+                       .known = variant == 1,
+                       .components = variant == 2 ? 40 : 0,
+                       .penalties = variant == 3,
+                       .excluded = variant == 3};
             open_scene(&s);
             RfWindowMatch matches[QUERIES];
             RfWindowQueries queries = queries_of(&s);
@@ -514,13 +592,14 @@ static void print_matches(void)
 
 static char *matches_with(const char *set)
 {
-    char command[4096], *text = calloc(1 << 16, 1);
+    const size_t room = 1 << 17;
+    char command[4096], *text = calloc(room, 1);
     snprintf(command, sizeof command, "RF_SIMD=%s '%s' print", set, g_program);
     FILE *pipe = popen(command, "r");
     assert_non_null(pipe);
-    size_t length = fread(text, 1, (1 << 16) - 1, pipe);
+    size_t length = fread(text, 1, room - 1, pipe);
     assert_int_equal(pclose(pipe), 0);
-    assert_true(length > QUERIES * 8 * 4);
+    assert_true(length > QUERIES * 20 * 4 && length < room - 1);
     return text;
 }
 
@@ -531,14 +610,14 @@ static void every_instruction_set_finds_the_same(void **state)
     {
         RfSimdLevel level;
         const char *name;
-    } sets[] = {{RF_SIMD_AVX2, "avx2"}, {RF_SIMD_AVX512, "avx512"}};
+    } sets[] = {{RF_SIMD_AVX2, "avx2"}, {RF_SIMD_AVX512, "avx512"}, {RF_SIMD_AVX512, "all"}}; // all: short integers too
     if (rf_simd_level() == RF_SIMD_PLAIN)
     {
         print_message("skipped: this machine has the plain instruction set only\n");
         skip();
     }
     char *plain = matches_with("plain");
-    for (int i = 0; i < 2; ++i)
+    for (int i = 0; i < 3; ++i)
     {
         if (rf_simd_level() < sets[i].level)
         {
@@ -618,72 +697,6 @@ static void what_holds_no_window_is_bad_input(void **state)
     rf_windows_destroy(database);
 }
 
-// ---- principal components ----------------------------------------------------------------------------------------
-
-enum
-{
-    VECTORS = 500,
-    LENGTH = 70
-};
-
-static float g_vectors[VECTORS][LENGTH];
-
-static void read_vectors(const void *context, int item, float *panel)
-{
-    (void)context;
-    for (int k = 0; k < LENGTH; ++k)
-        for (int q = 0; q < RF_TILE_QUERIES; ++q)
-            panel[k * RF_TILE_QUERIES + q] = item + q < VECTORS ? g_vectors[item + q][k] : 0;
-}
-
-static void the_basis_is_orthonormal_and_finds_what_was_put_in(void **state)
-{
-    (void)state;
-    // 40 directions of falling strength: cosines, which are orthogonal.
-    for (int i = 0; i < VECTORS; ++i)
-        for (int k = 0; k < LENGTH; ++k)
-        {
-            g_vectors[i][k] = 0;
-            for (int m = 0; m < 40; ++m)
-                g_vectors[i][k] += powf(0.8f, (float)m) * (rf_random_float(8, 0, (uint64_t)i, (uint64_t)m) - 0.5f) *
-                                   cosf(3.14159265f * (float)m * ((float)k + 0.5f) / LENGTH);
-        }
-    _Alignas(64) static float basis[LENGTH * 32];
-    double variances[32], total;
-    RfPanelReader reader = {read_vectors, NULL, VECTORS, LENGTH};
-    assert_int_equal(rf_principal_components(&reader, 1, basis, variances, &total), RF_OK);
-    double held = 0;
-    for (int a = 0; a < 32; ++a)
-    {
-        for (int b = 0; b < 32; ++b)
-        {
-            double product = 0;
-            for (int k = 0; k < LENGTH; ++k)
-                product += (double)basis[k * 32 + a] * (double)basis[k * 32 + b];
-            assert_true(fabs(product - (a == b)) < 1e-5);
-        }
-        assert_true(a == 0 || variances[a] <= variances[a - 1]);
-        held += variances[a];
-    }
-    // The first 32 of 40 directions hold all but 0.8^64 / (1 - 0.8^2) of it.
-    assert_true(held > 0.99999 * total && held <= total * (1 + 1e-6));
-}
-
-static void what_the_vectors_do_not_span_holds_no_variance(void **state)
-{
-    (void)state;
-    for (int i = 0; i < VECTORS; ++i)
-        for (int k = 0; k < LENGTH; ++k)
-            g_vectors[i][k] = (float)(i % 7) * (float)(k == 3) + (float)(i % 5) * (float)(k == 50);
-    _Alignas(64) static float basis[LENGTH * 32];
-    double variances[32], total;
-    RfPanelReader reader = {read_vectors, NULL, VECTORS, LENGTH};
-    assert_int_equal(rf_principal_components(&reader, 1, basis, variances, &total), RF_OK);
-    assert_true(fabs(variances[0] + variances[1] - total) < 1e-5 * total);
-    for (int a = 2; a < 32; ++a)
-        assert_true(variances[a] < 1e-9 * total);
-}
-
 int main(int argc, char **argv)
 {
     g_program = argv[0];
@@ -696,6 +709,10 @@ int main(int argc, char **argv)
         cmocka_unit_test(the_match_is_the_nearest_window),
         cmocka_unit_test(so_it_is_where_windows_wrap),
         cmocka_unit_test(so_it_is_with_few_and_with_many_components),
+        cmocka_unit_test(so_it_is_where_a_second_bound_sieves),
+        cmocka_unit_test(queries_may_be_larger_than_any_candidate),
+        cmocka_unit_test(penalties_may_be_out_of_proportion),
+        cmocka_unit_test(pictures_may_be_tiny_or_huge),
         cmocka_unit_test(so_it_is_with_channel_weights),
         cmocka_unit_test(so_it_is_among_turned_copies_with_masks),
         cmocka_unit_test(so_it_is_where_masked_copies_wrap),
@@ -714,8 +731,6 @@ int main(int argc, char **argv)
         cmocka_unit_test(windows_are_read_and_gathered_alike),
         cmocka_unit_test(candidates_are_numbered_by_copy_row_and_column),
         cmocka_unit_test(what_holds_no_window_is_bad_input),
-        cmocka_unit_test(the_basis_is_orthonormal_and_finds_what_was_put_in),
-        cmocka_unit_test(what_the_vectors_do_not_span_holds_no_variance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

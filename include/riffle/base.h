@@ -80,8 +80,9 @@ RF_API void rf_set_threads(int count);
 RF_API int rf_threads(void);
 
 /// The instruction set in use: "plain", "avx2" or "avx512". The environment variable RF_SIMD picks a lower one than the
-/// machine has. Results are the same bytes for any number of threads on one instruction set; between two sets they
-/// agree within 1e-4.
+/// machine has. (AVX-512 comes with VNNI or without; RF_SIMD=avx512 does not use it. No result differs by that.)
+/// Results are the same bytes for any number of threads on one instruction set; between two sets they agree within
+/// 1e-4.
 RF_API const char *rf_simd_name(void);
 
 /// Progress of a long call. `report` gets the stage's name and the fraction of it done, 0 to 1, which does not decrease

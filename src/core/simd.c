@@ -37,6 +37,29 @@ RfSimdLevel rf_simd_level(void)
     return (RfSimdLevel)known;
 }
 
+static int find_shorts(void)
+{
+#if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
+    const char *wanted = getenv("RF_SIMD");
+    return rf_simd_level() == RF_SIMD_AVX512 && __builtin_cpu_supports("avx512vnni") &&
+           !(wanted && strcmp(wanted, level_names[RF_SIMD_AVX512]) == 0);
+#else
+    return 0;
+#endif
+}
+
+bool rf_simd_multiplies_shorts(void)
+{
+    static int shorts = -1;
+    int known = __atomic_load_n(&shorts, __ATOMIC_RELAXED);
+    if (known < 0)
+    {
+        known = find_shorts();
+        __atomic_store_n(&shorts, known, __ATOMIC_RELAXED);
+    }
+    return known;
+}
+
 const char *rf_simd_name(void)
 {
     return level_names[rf_simd_level()];

@@ -7,6 +7,8 @@
 // RF_SIMD=plain|avx2|avx512 can pick a lower set, which tests need to hold the sets against each other.
 #pragma once
 
+#include <stdbool.h>
+
 typedef enum RfSimdLevel
 {
     RF_SIMD_PLAIN,
@@ -16,6 +18,10 @@ typedef enum RfSimdLevel
 
 /// What the machine has, or less if the environment variable RF_SIMD says so. Read once.
 RfSimdLevel rf_simd_level(void);
+
+/// Whether there is, besides AVX-512, its product of 16-bit integers (VNNI). RF_SIMD=avx512 does without it. No result
+/// depends on it.
+bool rf_simd_multiplies_shorts(void);
 
 #define RF_WIDE_BODY static inline __attribute__((always_inline))
 

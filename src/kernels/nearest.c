@@ -40,6 +40,14 @@ static inline unsigned below_4(Vec4 a, Vec4 limit)
 #define LEAST(a, b) least_4(a, b)
 #define BELOW(a, limit) below_4(a, limit)
 #endif
+static inline int list_bits(unsigned bits, int base, int *list)
+{
+    int listed = 0;
+    for (; bits; bits &= bits - 1)
+        list[listed++] = base + __builtin_ctz(bits);
+    return listed;
+}
+#define LIST_BITS(bits, base, list) list_bits(bits, base, list)
 #define SET(name) name##_plain
 #define TARGET
 #define WIDTH 4
@@ -57,10 +65,19 @@ static inline unsigned below_4(Vec4 a, Vec4 limit)
 #define ROWS 6
 #define LEAST(a, b) _mm256_min_ps(a, b)
 #define BELOW(a, limit) (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(a, limit, _CMP_LE_OQ))
+#define LIST_BITS(bits, base, list) list_bits(bits, base, list)
 #include "kernels/nearest_wide.h"
 
+__attribute__((target("avx512f,popcnt"))) static inline int list_bits_avx512(unsigned bits, int base, int *list)
+{
+    __m512i numbers = _mm512_add_epi32(_mm512_set1_epi32(base),
+                                       _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15));
+    _mm512_storeu_si512(list, _mm512_maskz_compress_epi32((__mmask16)bits, numbers));
+    return __builtin_popcount(bits);
+}
+#define LIST_BITS(bits, base, list) list_bits_avx512(bits, base, list)
 #define SET(name) name##_avx512
-#define TARGET __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,fma")))
+#define TARGET __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,fma,popcnt")))
 #define WIDTH 16
 #define Vector Vec16
 #define ROWS 12
@@ -78,6 +95,11 @@ void rf_tile_products(const float *queries, const float *candidates, int numbers
                       ptrdiff_t stride)
 {
     CHOOSE(tile_products)(queries, candidates, numbers, start, out, stride);
+}
+
+void rf_project(const float *windows, int numbers, const float *basis, float *out, ptrdiff_t stride)
+{
+    CHOOSE(project)(windows, numbers, basis, out, stride);
 }
 
 void rf_fold_group(const float *bounds, ptrdiff_t bounds_stride, int queries, float *minima, ptrdiff_t minima_stride)

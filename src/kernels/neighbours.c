@@ -17,21 +17,25 @@
 //     3. the full distance of every other candidate whose bound does not exceed the best so far
 //
 // Step 3 finds 2 to 20 candidates of 3136 on water and foam (9 x 9 x 2 numbers), 50 to 200 on what has no dominant
-// components, such as bubbles; more components are kept there (windows.c). The residual's norm leaves 2 to 20 times
-// fewer where queries are blended or the exemplar is smooth, and is worth one more component elsewhere.
+// components, such as bubbles; more components are kept there (window_projection.c). The residual's norm leaves 2 to 20
+// times fewer where queries are blended or the exemplar is smooth, and is worth one more component elsewhere.
 //
 // Candidates are walked in chunks, so that the bounds stay in the second cache; the best so far goes from chunk to
 // chunk.
 //
 // Tried and dropped: norms of groups of components, or of the residual's quarters, instead of components (more
-// candidates are left for as many numbers); a second bound from 14 further components for what the first one leaves (15
-// % faster on lava, no faster elsewhere); groups of 2 or 8 tiles instead of 4.
+// candidates are left for as many numbers); groups of 2 or 8 tiles instead of 4.
+//
+// Where the machine multiplies 16-bit integers twice as fast as floats, step 1 is done in these, and what it leaves is
+// sieved by a second bound before step 3 (short_bounds.c has the proof). What cannot be done in them (masked queries,
+// queries far larger than any candidate, penalties out of proportion) is done in floats.
 //
 // Exact in spite of rounding. Steps 2 and 3 compare by direct differences in one order, whatever the instruction set.
 // Bounds are rounded, so step 3 grants them a slack: a sum of n products is taken to be off by n 2^-23 of the sum of
 // their sizes, twice the worst that can be (n 2^-24), and many times what rounding of random sign leaves (sqrt(n)
 // 2^-24; Higham and Mary. A new approach to probabilistic rounding error analysis. 2019). It costs nothing that could
-// be measured. A residual's norm is the root of a difference; how far it can be off is kept with it (windows.c).
+// be measured. A residual's norm is the root of a difference; how far it can be off is kept with it
+// (window_projection.c).
 //
 // Few numbers (w <= 3 or so) are compared as they are. Masked queries have no common components; they are compared in
 // all numbers, and in one more a pixel, which makes the weighted square a product too:
@@ -47,194 +51,24 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/result.h"
-#include "kernels/principal.h"
-#include "kernels/windows.h"
+#include "kernels/searching.h"
 
 #include <string.h>
 
 enum
 {
-    // 12 rows of bounds are 200 KB.
-    CHUNK = 4096,
     // Rows of bounds do not start a multiple of 4096 bytes apart: 24 stores of a tile would fall on one cache set.
     BOUNDS_MARGIN = RF_TILE_CANDIDATES,
     // Candidates to a minimum.
     FOLD = RF_GROUP_CANDIDATES / RF_GROUP_LANES,
-    // Masked queries share a tile that is gathered for them.
-    MASKED_PANELS = 8,
-    MASKED_CHUNK = 512,
-    MAX_PANELS = MASKED_PANELS
+    MASKED_CHUNK = 512
 };
-
-typedef struct Query
-{
-    RfWindowRows rows, weights;
-    // Of the numbers compared; and in all that the slack is made of.
-    float norm, slack, residual_error;
-    bool valid;
-    // The candidate of the chunk with the least bound.
-    int nearest;
-    // distance + penalty of the best so far, its bare distance, and which it is
-    float score, distance;
-    int candidate;
-    // Bounds above cannot be better.
-    float limit;
-} Query;
-
-typedef struct Worker
-{
-    Query query[MAX_PANELS * RF_TILE_QUERIES];
-    int list[CHUNK + 1];
-    // panel[numbers][12], products[12][blocks * 32], kept[panels][kept][12], rows and weight rows of every query,
-    // bounds, minima, and for masked queries a tile of candidates [kept][32] and its starts [32]
-    float *panel, *products, *kept, *rows, *weights, *bounds, *minima, *tile;
-} Worker;
-
-typedef struct Search
-{
-    const RfWindowDatabase *database;
-    const RfWindowQueries *queries;
-    RfWindowMatch *matches;
-    bool masked;
-    int kept, panels, chunk;
-    // Of a query's bounds and of their minima.
-    size_t bounds_stride, minima_stride;
-    // [tiles * 32]: what the sums start from
-    const float *starts;
-    float *own_starts;
-    float least_penalty, largest_penalty;
-    Worker *workers;
-    float *scratch;
-} Search;
-
-// ---- queries -----------------------------------------------------------------------------------------------------
-
-static size_t row_room(const RfWindowDatabase *d)
-{
-    return (size_t)d->side * (size_t)d->row_numbers;
-}
-
-static bool all_in_range(const float *numbers, int count)
-{
-    int outside = 0;
-    for (int k = 0; k < count; ++k)
-        outside += !(fabsf(numbers[k]) <= RF_WINDOW_LARGEST);
-    return outside == 0;
-}
-
-// Rows are padded with 0. (A call of memcpy takes longer than these few numbers.)
-static void copy_row(const float *row, int count, int padded, float *out)
-{
-    int i = 0;
-    for (; i + 4 <= count; i += 4)
-        memcpy(out + i, row + i, 4 * sizeof *out);
-    for (; i < padded; ++i)
-        out[i] = i < count ? row[i] : 0;
-}
-
-// Numbers of weight 0 become 0.
-static void mask_row(const RfWindowDatabase *d, const float *mask, float *row, float *weights)
-{
-    for (int i = 0; i < d->row_numbers; ++i)
-    {
-        float weight = i < d->side * d->channels ? mask[i / d->channels] : 0;
-        weights[i] = weight * d->row_weights[i];
-        row[i] = weight > 0 ? row[i] : 0;
-    }
-}
-
-// Returns whether all numbers that count are in range.
-static bool copy_query(const Search *search, int index, float *rows, float *weights)
-{
-    const RfWindowDatabase *d = search->database;
-    int row = d->side * d->channels;
-    const float *window = search->queries->windows + (size_t)index * (size_t)d->numbers;
-    for (int j = 0; j < d->side; ++j)
-        copy_row(window + j * row, row, d->row_numbers, rows + j * d->row_numbers);
-    if (!search->masked)
-        return all_in_range(window, d->numbers);
-    const float *mask = search->queries->weights + (size_t)index * (size_t)d->side * (size_t)d->side;
-    for (int j = 0; j < d->side; ++j)
-        mask_row(d, mask + j * d->side, rows + j * d->row_numbers, weights + j * d->row_numbers);
-    return all_in_range(rows, d->side * d->row_numbers);
-}
-
-// m s^2 q and m / 2: see the top. `panel` holds s q; sums[q] becomes sum m s^2 q^2.
-static void mask_panel(const Search *search, int first, int count, const float *panel, float *kept, float *sums)
-{
-    const RfWindowDatabase *d = search->database;
-    int pixels = d->side * d->side;
-    float *halves = kept + (size_t)d->numbers * RF_TILE_QUERIES;
-    memset(halves, 0, (size_t)pixels * RF_TILE_QUERIES * sizeof *halves);
-    memset(kept, 0, (size_t)d->numbers * RF_TILE_QUERIES * sizeof *kept);
-    for (int q = 0; q < count; ++q)
-    {
-        const float *mask = search->queries->weights + (size_t)(first + q) * (size_t)pixels;
-        sums[q] = 0;
-        for (int k = 0; k < d->numbers; ++k)
-        {
-            float number = panel[k * RF_TILE_QUERIES + q], weight = mask[k / d->channels];
-            kept[k * RF_TILE_QUERIES + q] = weight * number;
-            sums[q] += weight * number * number;
-        }
-        for (int p = 0; p < pixels; ++p)
-            halves[p * RF_TILE_QUERIES + q] = 0.5f * mask[p];
-    }
-}
-
-static float most_weight(const Search *search, int index)
-{
-    int pixels = search->database->side * search->database->side;
-    float most = 0;
-    for (int p = 0; p < pixels; ++p)
-        most = rf_max(search->queries->weights[(size_t)index * (size_t)pixels + (size_t)p], most);
-    return most;
-}
-
-static void load_panel(const Search *search, Worker *worker, int panel_index, int first, int count)
-{
-    const RfWindowDatabase *d = search->database;
-    Query *query = worker->query + panel_index * RF_TILE_QUERIES;
-    float *kept = worker->kept + (size_t)panel_index * (size_t)search->kept * RF_TILE_QUERIES;
-    RfWindowRows windows[RF_TILE_QUERIES];
-    RfPanelNorms norms;
-    for (int q = 0; q < count; ++q)
-    {
-        size_t place = (size_t)(panel_index * RF_TILE_QUERIES + q) * row_room(d);
-        float *rows = worker->rows + place, *weights = search->masked ? worker->weights + place : NULL;
-        query[q].valid = copy_query(search, first + q, rows, weights);
-        if (!query[q].valid)
-            memset(rows, 0, row_room(d) * sizeof *rows);
-        query[q].rows = windows[q] = (RfWindowRows){rows, d->row_numbers};
-        query[q].weights = search->masked ? (RfWindowRows){weights, d->row_numbers} : (RfWindowRows){d->row_weights, 0};
-    }
-    rf_pack_panel(d, windows, count, worker->panel);
-    if (search->masked)
-    {
-        memset(&norms, 0, sizeof norms);
-        mask_panel(search, first, count, worker->panel, kept, norms.norm);
-    }
-    else
-    {
-        rf_keep_panel(d, worker->panel, worker->products, kept, &norms);
-    }
-    float rounding = rf_rounding_of(d->numbers + search->kept);
-    for (int q = 0; q < count; ++q)
-    {
-        float weight = search->masked ? most_weight(search, first + q) : 1;
-        query[q].norm = norms.norm[q];
-        query[q].slack = 4 * rounding * (norms.norm[q] + weight * d->largest_norm + search->largest_penalty);
-        query[q].residual_error = norms.residual_error[q] + (search->masked ? 0 : d->residual_error);
-        query[q].score = query[q].distance = query[q].limit = INFINITY;
-        query[q].candidate = -1;
-    }
-}
 
 // ---- bounds ------------------------------------------------------------------------------------------------------
 
 // A tile for masked queries: negative numbers [numbers][32], then their squares, summed over a pixel's channels,
 // [pixels][32].
-static void gather_tile(const Search *search, int first, Worker *worker)
+static void gather_tile(const RfSearch *search, int first, RfSearchWorker *worker)
 {
     const RfWindowDatabase *d = search->database;
     float *squares = worker->tile + (size_t)d->numbers * RF_TILE_CANDIDATES;
@@ -256,16 +90,45 @@ static void gather_tile(const Search *search, int first, Worker *worker)
     }
 }
 
+// Queries come from memory once; the block that this worker is likely to take next comes while this one is searched,
+// a few lines a group: all at once would have to be waited for.
+static void plan_prefetch(const RfSearch *search, RfSearchWorker *worker, int64_t start, int count)
+{
+    int64_t numbers = search->database->numbers, left = search->queries->count - start,
+            groups = (search->database->tiles_of_candidates - 1) / RF_GROUP_TILES + 1;
+    worker->next = worker->next_end = search->queries->windows;
+    if (left <= 0)
+        return;
+    worker->next += start * numbers;
+    worker->next_end = worker->next + numbers * (left < count ? left : count);
+    worker->lines_a_group = (int)((worker->next_end - worker->next) / (16 * groups)) + 1;
+}
+
+static void prefetch_queries(RfSearchWorker *worker)
+{
+    for (int i = 0; i < worker->lines_a_group && worker->next < worker->next_end; ++i, worker->next += 16)
+        __builtin_prefetch(worker->next, 0, 2);
+}
+
 // Bounds of `panels` panels against candidates first .. first + count - 1 (whole tiles), with their minima.
-static void fill_bounds(const Search *search, Worker *worker, int panels, int first, int count)
+static void fill_bounds(const RfSearch *search, RfSearchWorker *worker, int panels, int first, int count)
 {
     const RfWindowDatabase *d = search->database;
     size_t tile_room = (size_t)search->kept * RF_TILE_CANDIDATES;
     for (int group = 0; group < count; group += RF_GROUP_CANDIDATES)
     {
         int end = rf_min_int(group + RF_GROUP_CANDIDATES, count);
+        prefetch_queries(worker);
         for (int c = group; c < end; c += RF_TILE_CANDIDATES)
         {
+            if (worker->in_shorts)
+            {
+                rf_short_products(worker->shorts[0],
+                                  d->shorts.numbers + (size_t)(first + c) * (size_t)d->shorts.pairs * 2,
+                                  d->shorts.pairs, search->short_starts + first + c, worker->bounds + c,
+                                  (ptrdiff_t)search->bounds_stride);
+                continue;
+            }
             const float *tile = worker->tile;
             if (search->masked)
                 gather_tile(search, first + c, worker);
@@ -287,7 +150,7 @@ static void fill_bounds(const Search *search, Worker *worker, int panels, int fi
     }
 }
 
-static void exclude(const Search *search, RfWindowPlace place, int first, int count, float *bounds, float *minima)
+static void exclude(const RfSearch *search, RfWindowPlace place, int first, int count, float *bounds, float *minima)
 {
     const RfWindowDatabase *d = search->database;
     RfExclusion exclusion = {.reach = (float)d->side, .period_x = d->period_x, .period_y = d->period_y};
@@ -299,17 +162,19 @@ static void exclude(const Search *search, RfWindowPlace place, int first, int co
 
 // ---- full comparisons --------------------------------------------------------------------------------------------
 
-// No candidate whose bound (as stored: half of it, less half the query's norm) is above this can be as near as the
-// best.
-static float bound_limit(const Search *search, const Query *query)
+// No candidate whose bound (as stored: half of it, less half the query's norm, or as integers have it) is above this
+// can be as near as the best.
+static float bound_limit(const RfSearch *search, const RfSearchQuery *query, double e, bool in_shorts)
 {
-    double apart = fmax((double)query->score - (double)search->least_penalty, 0), e = (double)query->residual_error,
+    double apart = fmax((double)query->score - (double)search->least_penalty, 0),
            slack = (double)query->slack + 2 * sqrt(apart) * e + e * e +
                    4 * (double)rf_rounding_of(search->database->numbers) * apart;
+    if (in_shorts)
+        return rf_short_limit(&search->database->shorts, apart + slack, query->square);
     return (float)(0.5 * ((double)query->score + slack - (double)query->norm));
 }
 
-static void compare(const Search *search, Query *query, int candidate)
+static void compare(const RfSearch *search, const RfSearchWorker *worker, RfSearchQuery *query, int candidate)
 {
     const RfWindowDatabase *d = search->database;
     float distance = rf_window_distance(query->rows, rf_window_rows(d, candidate), query->weights, d->side,
@@ -320,11 +185,13 @@ static void compare(const Search *search, Query *query, int candidate)
     query->score = score;
     query->distance = distance;
     query->candidate = candidate;
-    query->limit = bound_limit(search, query);
+    query->limit = bound_limit(search, query, query->error, worker->in_shorts);
+    if (worker->in_shorts)
+        query->rest_limit = bound_limit(search, query, query->rest_error, true);
 }
 
 // Sets query->nearest, -1 if nothing in the chunk can be nearer than the best.
-static void find_nearest(Query *query, const float *bounds, const float *minima, int folded)
+static void find_nearest(RfSearchQuery *query, const float *bounds, const float *minima, int folded)
 {
     float least;
     query->nearest = rf_find_least(bounds, minima, folded, &least);
@@ -332,17 +199,20 @@ static void find_nearest(Query *query, const float *bounds, const float *minima,
         query->nearest = -1;
 }
 
-static void compare_others(const Search *search, Query *query, const float *bounds, const float *minima, int folded,
-                           int first, int *list)
+static void compare_others(const RfSearch *search, RfSearchWorker *worker, RfSearchQuery *query, const float *bounds,
+                           const float *minima, int folded, int first)
 {
-    int listed = rf_list_below(bounds, minima, folded, query->limit, list);
+    int *list = worker->list, listed = rf_list_below(bounds, minima, folded, query->limit, list);
+    if (worker->in_shorts && search->database->shorts.rests)
+        listed = rf_short_sieve(&search->database->shorts, worker->rests[query - worker->query], bounds, first,
+                                query->rest_limit, list, listed);
     for (int i = 0; i < listed; ++i)
         if (list[i] != query->nearest && bounds[list[i]] <= query->limit)
-            compare(search, query, first + list[i]);
+            compare(search, worker, query, first + list[i]);
 }
 
-// Query by query in three passes: within one, a processor can begin a query before it has ended the one before.
-static void visit_chunk(const Search *search, Worker *worker, int start, int queries, int first, int count)
+// RfSearchQuery by query in three passes: within one, a processor can begin a query before it has ended the one before.
+static void visit_chunk(const RfSearch *search, RfSearchWorker *worker, int start, int queries, int first, int count)
 {
     int folded = (count + RF_GROUP_CANDIDATES - 1) / RF_GROUP_CANDIDATES * RF_GROUP_LANES;
     const RfWindowPlace *excluded = search->queries->excluded;
@@ -356,16 +226,16 @@ static void visit_chunk(const Search *search, Worker *worker, int start, int que
     }
     for (int q = 0; q < queries; ++q)
         if (worker->query[q].nearest >= 0)
-            compare(search, &worker->query[q], first + worker->query[q].nearest);
+            compare(search, worker, &worker->query[q], first + worker->query[q].nearest);
     for (int q = 0; q < queries; ++q)
         if (worker->query[q].nearest >= 0)
-            compare_others(search, &worker->query[q], worker->bounds + (size_t)q * search->bounds_stride,
-                           worker->minima + (size_t)q * search->minima_stride, folded, first, worker->list);
+            compare_others(search, worker, &worker->query[q], worker->bounds + (size_t)q * search->bounds_stride,
+                           worker->minima + (size_t)q * search->minima_stride, folded, first);
 }
 
 // ---- the walk ----------------------------------------------------------------------------------------------------
 
-static void write_matches(const Search *search, const Query *query, int first, int count)
+static void write_matches(const RfSearch *search, const RfSearchQuery *query, int first, int count)
 {
     for (int q = 0; q < count; ++q, ++query)
     {
@@ -376,29 +246,18 @@ static void write_matches(const Search *search, const Query *query, int first, i
     }
 }
 
-// Queries come from memory once; the block that this worker is likely to take next comes while this one is searched.
-static void prefetch_queries(const Search *search, int64_t start, int count)
-{
-    int64_t numbers = search->database->numbers, left = search->queries->count - start;
-    if (left <= 0)
-        return;
-    const float *windows = search->queries->windows + start * numbers;
-    for (int64_t k = 0; k < numbers * (left < count ? left : count); k += 16)
-        __builtin_prefetch(windows + k, 0, 2);
-}
-
 static void search_block(void *context, int item, int index)
 {
-    const Search *search = context;
+    const RfSearch *search = context;
     const RfWindowDatabase *d = search->database;
-    Worker *worker = &search->workers[index];
+    RfSearchWorker *worker = &search->workers[index];
     int block = search->panels * RF_TILE_QUERIES, start = item * block,
         queries = rf_min_int(block, search->queries->count - start),
         panels = (queries + RF_TILE_QUERIES - 1) / RF_TILE_QUERIES, all = d->tiles_of_candidates * RF_TILE_CANDIDATES;
     for (int p = 0; p < panels; ++p)
-        load_panel(search, worker, p, start + p * RF_TILE_QUERIES,
-                   rf_min_int(RF_TILE_QUERIES, queries - p * RF_TILE_QUERIES));
-    prefetch_queries(search, start + (int64_t)block * rf_threads(), block);
+        rf_search_load(search, worker, p, start + p * RF_TILE_QUERIES,
+                       rf_min_int(RF_TILE_QUERIES, queries - p * RF_TILE_QUERIES));
+    plan_prefetch(search, worker, start + (int64_t)block * rf_threads(), block);
     for (int first = 0; first < all; first += search->chunk)
     {
         int count = rf_min_int(search->chunk, all - first);
@@ -427,7 +286,7 @@ static RfResult check_queries(const RfWindowDatabase *d, const RfWindowQueries *
 }
 
 // |c|^2 / 2 (not for masked queries, whose product holds it) plus half the penalty.
-static RfResult make_starts(Search *search)
+static RfResult make_starts(RfSearch *search)
 {
     const RfWindowDatabase *d = search->database;
     const float *penalties = search->queries->penalties;
@@ -452,6 +311,28 @@ static RfResult make_starts(Search *search)
     return RF_OK;
 }
 
+// Integers serve where all numbers of a window are known and penalties are not out of all proportion.
+static RfResult make_short_starts(RfSearch *search)
+{
+    const RfWindowDatabase *d = search->database;
+    const float *penalties = search->queries->penalties;
+    if (search->masked || !d->shorts.numbers ||
+        !rf_short_fits(&d->shorts, (double)search->largest_penalty - (double)search->least_penalty))
+        return RF_OK;
+    search->short_starts = d->shorts.starts;
+    if (!penalties)
+        return RF_OK;
+    size_t room = (size_t)d->tiles_of_candidates * RF_TILE_CANDIDATES;
+    search->short_starts = search->own_short_starts = rf_allocate(room, sizeof *search->own_short_starts);
+    if (!search->own_short_starts)
+        return RF_OUT_OF_MEMORY;
+    memcpy(search->own_short_starts, d->shorts.starts, room * sizeof *search->own_short_starts);
+    for (int i = 0; i < d->candidates; ++i)
+        search->own_short_starts[i] =
+            rf_short_start(&d->shorts, i, (double)penalties[i] - (double)search->least_penalty);
+    return RF_OK;
+}
+
 static float *take(float **memory, size_t count)
 {
     float *start = *memory;
@@ -459,15 +340,14 @@ static float *take(float **memory, size_t count)
     return start;
 }
 
-static RfResult make_workers(Search *search)
+static RfResult make_workers(RfSearch *search)
 {
     const RfWindowDatabase *d = search->database;
     size_t threads = (size_t)rf_threads(), queries = (size_t)search->panels * RF_TILE_QUERIES,
-           kept = (size_t)search->kept, rows = queries * row_room(d), bounds = queries * search->bounds_stride,
-           minima = queries * search->minima_stride, panel = (size_t)d->numbers * RF_TILE_QUERIES,
-           products = (size_t)d->blocks * RF_BASIS_BLOCK * RF_TILE_QUERIES,
-           tile = search->masked ? kept * RF_TILE_CANDIDATES : 0,
-           each = panel + products + kept * queries + 2 * rows + bounds + minima + tile;
+           kept = (size_t)search->kept, rows = queries * rf_search_row_room(search),
+           bounds = queries * search->bounds_stride, minima = queries * search->minima_stride,
+           panel = (size_t)rf_block_numbers(d) * RF_TILE_QUERIES, tile = search->masked ? kept * RF_TILE_CANDIDATES : 0,
+           each = panel + kept * queries + 2 * rows + bounds + minima + tile;
     each = (each + 8 * 16 + 15) / 16 * 16;
     search->workers = rf_allocate(threads, sizeof *search->workers);
     search->scratch = rf_allocate_zero(threads, each * sizeof *search->scratch);
@@ -475,10 +355,9 @@ static RfResult make_workers(Search *search)
         return RF_OUT_OF_MEMORY;
     for (size_t i = 0; i < threads; ++i)
     {
-        Worker *worker = &search->workers[i];
+        RfSearchWorker *worker = &search->workers[i];
         float *memory = search->scratch + i * each;
         worker->panel = take(&memory, panel);
-        worker->products = take(&memory, products);
         worker->kept = take(&memory, kept * queries);
         worker->rows = take(&memory, rows);
         worker->weights = take(&memory, rows);
@@ -494,18 +373,22 @@ RfResult rf_windows_search(const RfWindowDatabase *database, const RfWindowQueri
     RF_TRY(check_queries(database, queries, matches));
     if (queries->count == 0)
         return RF_OK;
-    Search search = {.database = database, .queries = queries, .matches = matches, .masked = queries->weights != NULL};
+    RfSearch search = {
+        .database = database, .queries = queries, .matches = matches, .masked = queries->weights != NULL};
     search.kept = search.masked ? database->numbers + database->side * database->side : database->kept;
-    search.panels = search.masked ? MASKED_PANELS : 1;
-    search.chunk = search.masked ? MASKED_CHUNK : CHUNK;
+    search.panels = search.masked ? RF_MASKED_PANELS : 1;
+    search.chunk = search.masked ? MASKED_CHUNK : RF_SEARCH_CHUNK;
     search.bounds_stride = (size_t)search.chunk + BOUNDS_MARGIN;
     search.minima_stride = (size_t)search.chunk / FOLD;
     RfResult result = make_starts(&search);
+    if (result == RF_OK)
+        result = make_short_starts(&search);
     if (result == RF_OK)
         result = make_workers(&search);
     if (result == RF_OK)
         rf_parallel_for((queries->count - 1) / (search.panels * RF_TILE_QUERIES) + 1, search_block, &search);
     rf_release(search.own_starts);
+    rf_release(search.own_short_starts);
     rf_release(search.workers);
     rf_release(search.scratch);
     return result;

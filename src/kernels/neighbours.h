@@ -77,7 +77,8 @@ typedef struct RfWindowQueries
     /// [count][side][side][channels].
     const float *windows;
     /// [count][side][side], 0 to 1e4, or NULL for all 1: how much a pixel counts; 0: not known, its numbers are not
-    /// looked at. About (components + 1) : (numbers + side^2) slower than without.
+    /// looked at. About (components + 1) : (numbers + side^2) slower than without, and twice that where the machine
+    /// has VNNI.
     const float *weights;
     /// [candidates] or NULL: added to the distance when the least is looked for, not to the distance that is told. Any
     /// finite numbers within +-1e30; to spread use evenly over the exemplar.

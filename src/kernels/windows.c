@@ -5,110 +5,21 @@
 #include "kernels/windows.h"
 #include "core/maths.h"
 #include "core/memory.h"
-#include "core/parallel.h"
 #include "core/result.h"
-#include "kernels/principal.h"
 
 #include <string.h>
 
 enum
 {
-    // Windows that the principal components are found from, evenly over all: more move the kept variance by under 0.1
-    // %.
-    MAX_SAMPLES = 2048,
-    // Up to here the numbers themselves are compared.
-    COMPLETE_NUMBERS = 24,
-    // Fastest are 11 on water, 23 to 27 on foam, 31 to 39 on gravel, 39 to 47 on bubbles, 47 to 63 on lava (64 x 64
-    // pixels, 9 x 9 x 2 numbers; bench/neighbours.c): the rule below is within 15 % of all of them.
-    MOST_COMPONENTS = 47,
-    LEAST_COMPONENTS = 11,
     MAX_NUMBERS = 1 << 14,
-    PANELS_AN_ITEM = 8,
     POOL_MARGIN = 16
 };
-#define VARIANCE_WANTED 0.93
-
-float rf_rounding_of(int numbers)
-{
-    return (float)(numbers + 16) * 0x1p-23f;
-}
 
 RfWindowRows rf_window_rows(const RfWindowDatabase *d, int candidate)
 {
     RfWindowPlace p = d->places[candidate];
     const RfWindowCopy *copy = &d->copy[p.copy];
     return (RfWindowRows){d->pixels + copy->pixels + p.y * copy->stride + (ptrdiff_t)p.x * d->channels, copy->stride};
-}
-
-void rf_pack_panel(const RfWindowDatabase *d, const RfWindowRows *windows, int count, float *panel)
-{
-    const float *from[RF_TILE_QUERIES];
-    int row = d->side * d->channels;
-    float mean[RF_MAX_WINDOW_SIDE * RF_MAX_WINDOW_CHANNELS], scale[RF_MAX_WINDOW_SIDE * RF_MAX_WINDOW_CHANNELS];
-    for (int i = 0; i < row; ++i)
-    {
-        mean[i] = d->mean[i % d->channels];
-        scale[i] = d->scale[i % d->channels];
-    }
-    for (int j = 0; j < d->side; ++j, panel += row * RF_TILE_QUERIES)
-    {
-        for (int q = 0; q < RF_TILE_QUERIES; ++q)
-        {
-            const RfWindowRows *window = &windows[rf_min_int(q, count - 1)];
-            from[q] = window->numbers + j * window->stride;
-        }
-        for (int i = 0; i < row; ++i)
-        {
-            float *out = panel + i * RF_TILE_QUERIES;
-            for (int q = 0; q < RF_TILE_QUERIES; ++q)
-                out[q] = from[q][i];
-            for (int q = 0; q < RF_TILE_QUERIES; ++q)
-                out[q] = (out[q] - mean[i]) * scale[i];
-            for (int q = count; q < RF_TILE_QUERIES; ++q)
-                out[q] = 0;
-        }
-    }
-}
-
-// sums[q] = sum over k: panel[k][q]^2
-static void sum_squares(const float *panel, int numbers, float *restrict sums)
-{
-    memset(sums, 0, RF_TILE_QUERIES * sizeof *sums);
-    for (int k = 0; k < numbers; ++k, panel += RF_TILE_QUERIES)
-        for (int q = 0; q < RF_TILE_QUERIES; ++q)
-            sums[q] += panel[q] * panel[q];
-}
-
-// The residual's squared norm is a difference, off by at most e = rounding * norm^2; its root is then off by at most
-// min(sqrt(e), e / root).
-static void measure_residuals(const RfWindowDatabase *d, float *kept, RfPanelNorms *norms)
-{
-    float inside[RF_TILE_QUERIES], rounding = rf_rounding_of(d->numbers + d->components);
-    sum_squares(kept, d->components, inside);
-    kept += d->components * RF_TILE_QUERIES;
-    for (int q = 0; q < RF_TILE_QUERIES; ++q)
-    {
-        float error = rounding * norms->norm[q], residual = sqrtf(rf_max(norms->norm[q] - inside[q], 0));
-        kept[q] = residual;
-        norms->residual_error[q] = residual > 0 ? rf_min(sqrtf(error), error / residual) : sqrtf(error);
-    }
-}
-
-void rf_keep_panel(const RfWindowDatabase *d, const float *panel, float *products, float *kept, RfPanelNorms *norms)
-{
-    sum_squares(panel, d->numbers, norms->norm);
-    if (d->complete)
-    {
-        memcpy(kept, panel, (size_t)d->numbers * RF_TILE_QUERIES * sizeof *kept);
-        memset(norms->residual_error, 0, sizeof norms->residual_error);
-        return;
-    }
-    rf_project_panel(panel, d->numbers, d->basis, d->blocks, products);
-    int stride = d->blocks * RF_BASIS_BLOCK;
-    for (int k = 0; k < d->components; ++k)
-        for (int q = 0; q < RF_TILE_QUERIES; ++q)
-            kept[k * RF_TILE_QUERIES + q] = products[q * stride + k];
-    measure_residuals(d, kept, norms);
 }
 
 // ---- pictures and places -----------------------------------------------------------------------------------------
@@ -313,152 +224,7 @@ static void copy_pixels(RfWindowDatabase *d, const RfWindowSource *sources)
         d->mean[k] = (float)(sums[k] / pixels);
 }
 
-// ---- projection --------------------------------------------------------------------------------------------------
-
-typedef struct Samples
-{
-    const RfWindowDatabase *database;
-    int count;
-} Samples;
-
-static void read_samples(const void *context, int item, float *panel)
-{
-    const Samples *samples = context;
-    const RfWindowDatabase *d = samples->database;
-    RfWindowRows windows[RF_TILE_QUERIES];
-    int count = rf_min_int(samples->count - item, RF_TILE_QUERIES);
-    for (int q = 0; q < count; ++q)
-        windows[q] = rf_window_rows(d, (int)((int64_t)(item + q) * d->candidates / samples->count));
-    rf_pack_panel(d, windows, count, panel);
-}
-
-// Returns whether the components found hold what is wanted, or are as many as are.
-static bool choose_components(RfWindowDatabase *d, int wanted, const double *variances, double total)
-{
-    double held = 0;
-    int found = d->blocks * RF_BASIS_BLOCK, most = wanted > 0 ? wanted : MOST_COMPONENTS, count = 0;
-    bool enough = false;
-    while (count < found && count < most && !enough)
-    {
-        held += variances[count++];
-        enough = wanted == 0 && count >= LEAST_COMPONENTS && held >= VARIANCE_WANTED * total;
-    }
-    d->components = count;
-    d->kept = count + 1;
-    d->variance_kept = total > 0 ? (float)fmin(held / total, 1) : 1;
-    return enough || count == most;
-}
-
-static RfResult find_blocks(RfWindowDatabase *d, int blocks, int wanted, bool *enough)
-{
-    rf_release(d->basis);
-    d->blocks = blocks;
-    d->basis = rf_allocate((size_t)blocks * (size_t)d->numbers, RF_BASIS_BLOCK * sizeof *d->basis);
-    if (!d->basis)
-        return RF_OUT_OF_MEMORY;
-    double variances[RF_MAX_WINDOW_COMPONENTS], total;
-    Samples samples = {d, rf_min_int(d->candidates, MAX_SAMPLES)};
-    RfPanelReader reader = {read_samples, &samples, samples.count, d->numbers};
-    RF_TRY(rf_principal_components(&reader, blocks, d->basis, variances, &total));
-    *enough = choose_components(d, wanted, variances, total);
-    return RF_OK;
-}
-
-static RfResult find_components(RfWindowDatabase *d, int wanted)
-{
-    d->complete = d->numbers <= (wanted > 0 ? wanted : COMPLETE_NUMBERS);
-    if (d->complete)
-    {
-        d->components = d->kept = d->numbers;
-        d->variance_kept = 1;
-        return RF_OK;
-    }
-    bool enough = false;
-    for (int blocks = wanted > RF_BASIS_BLOCK ? 2 : 1; blocks <= 2 && !enough; ++blocks)
-        RF_TRY(find_blocks(d, blocks, wanted, &enough));
-    return RF_OK;
-}
-
-typedef struct Projection
-{
-    RfWindowDatabase *database;
-    // a worker: products[12][blocks * 32], panel[numbers][12], kept[kept][12]
-    float *scratch;
-    size_t scratch_size;
-    // [items]
-    float *largest_norm, *residual_error;
-} Projection;
-
-static void store_candidates(RfWindowDatabase *d, int first, int count, const float *kept)
-{
-    for (int q = 0; q < count; ++q)
-    {
-        int i = first + q;
-        float *out = d->kept_numbers + (size_t)(i / RF_TILE_CANDIDATES) * (size_t)d->kept * RF_TILE_CANDIDATES +
-                     i % RF_TILE_CANDIDATES,
-              half = 0;
-        for (int k = 0; k < d->kept; ++k)
-        {
-            float number = kept[k * RF_TILE_QUERIES + q];
-            out[k * RF_TILE_CANDIDATES] = -number;
-            half += 0.5f * number * number;
-        }
-        d->half_norms[i] = half;
-    }
-}
-
-static void project_item(void *context, int item, int worker)
-{
-    const Projection *projection = context;
-    RfWindowDatabase *d = projection->database;
-    float *products = projection->scratch + (size_t)worker * projection->scratch_size,
-          *panel = products + d->blocks * RF_BASIS_BLOCK * RF_TILE_QUERIES,
-          *kept = panel + d->numbers * RF_TILE_QUERIES, largest = 0, error = 0;
-    int first = item * PANELS_AN_ITEM * RF_TILE_QUERIES,
-        last = rf_min_int(first + PANELS_AN_ITEM * RF_TILE_QUERIES, d->candidates);
-    for (; first < last; first += RF_TILE_QUERIES)
-    {
-        RfWindowRows windows[RF_TILE_QUERIES];
-        RfPanelNorms norms;
-        int count = rf_min_int(last - first, RF_TILE_QUERIES);
-        for (int q = 0; q < count; ++q)
-            windows[q] = rf_window_rows(d, first + q);
-        rf_pack_panel(d, windows, count, panel);
-        rf_keep_panel(d, panel, products, kept, &norms);
-        store_candidates(d, first, count, kept);
-        for (int q = 0; q < count; ++q)
-        {
-            largest = rf_max(norms.norm[q], largest);
-            error = rf_max(norms.residual_error[q], error);
-        }
-    }
-    projection->largest_norm[item] = largest;
-    projection->residual_error[item] = error;
-}
-
-static RfResult project_candidates(RfWindowDatabase *d)
-{
-    int chunk = PANELS_AN_ITEM * RF_TILE_QUERIES, items = (d->candidates - 1) / chunk + 1;
-    Projection p = {.database = d};
-    p.scratch_size = (size_t)(d->numbers + d->kept + d->blocks * RF_BASIS_BLOCK) * RF_TILE_QUERIES;
-    p.scratch_size = (p.scratch_size + 15) / 16 * 16;
-    p.scratch = rf_allocate((size_t)rf_threads() * p.scratch_size, sizeof *p.scratch);
-    p.largest_norm = rf_allocate((size_t)items, 2 * sizeof *p.largest_norm);
-    RfResult result = p.scratch && p.largest_norm ? RF_OK : RF_OUT_OF_MEMORY;
-    if (result == RF_OK)
-    {
-        p.residual_error = p.largest_norm + items;
-        rf_parallel_for(items, project_item, &p);
-    }
-    for (int i = 0; result == RF_OK && i < items; ++i)
-    {
-        d->largest_norm = rf_max(p.largest_norm[i], d->largest_norm);
-        d->residual_error = rf_max(p.residual_error[i], d->residual_error);
-    }
-    rf_release(p.scratch);
-    rf_release(p.largest_norm);
-    return result;
-}
+// ---- everything -------------------------------------------------------------------------------------------------
 
 static RfResult allocate_candidates(RfWindowDatabase *d)
 {
@@ -479,22 +245,32 @@ static RfResult fill_database(RfWindowDatabase *d, const RfWindowSource *sources
 {
     d->copy = rf_allocate((size_t)d->copies, sizeof *d->copy);
     d->row_weights = rf_allocate_zero((size_t)d->row_numbers, sizeof *d->row_weights);
-    if (!d->copy || !d->row_weights)
+    d->means = rf_allocate_zero((size_t)rf_block_numbers(d), sizeof *d->means);
+    d->scales = rf_allocate_zero((size_t)rf_block_numbers(d), sizeof *d->scales);
+    if (!d->copy || !d->row_weights || !d->means || !d->scales)
         return RF_OUT_OF_MEMORY;
+    d->bare = true;
     for (int i = 0; i < d->side * d->channels; ++i)
     {
         float weight = options->channel_weights ? options->channel_weights[i % d->channels] : 1;
         d->row_weights[i] = weight;
+        d->bare &= weight == 1;
         d->scale[i % d->channels] = sqrtf(weight);
     }
     RF_TRY(lay_out_copies(d, sources));
     copy_pixels(d, sources);
+    for (int k = 0; k < d->numbers; ++k)
+    {
+        d->means[k] = d->mean[k % d->channels];
+        d->scales[k] = d->scale[k % d->channels];
+    }
     RF_TRY(find_places(d, sources));
-    RF_TRY(find_components(d, options->components));
+    RF_TRY(rf_find_components(d, options->components));
     RF_TRY(allocate_candidates(d));
+    RF_TRY(rf_allocate_shorts(d));
     for (int i = 0; i < d->candidates; ++i)
         rf_window_centre(d, d->places[i], &d->centre_x[i], &d->centre_y[i]);
-    return project_candidates(d);
+    return rf_project_candidates(d);
 }
 
 RfResult rf_windows_create(const RfWindowSource *sources, int count, const RfWindowOptions *options,
@@ -533,9 +309,14 @@ void rf_windows_destroy(RfWindowDatabase *d)
     rf_release(d->centre_x);
     rf_release(d->centre_y);
     rf_release(d->row_weights);
+    rf_release(d->means);
+    rf_release(d->scales);
     rf_release(d->basis);
     rf_release(d->kept_numbers);
     rf_release(d->half_norms);
+    rf_release(d->shorts.numbers);
+    rf_release(d->shorts.starts);
+    rf_release(d->shorts.rests);
     rf_release(d);
 }
 
