@@ -93,3 +93,27 @@ RF_API int rf_optimize_channels(const RfExemplar *exemplar);
 /// exemplar's range. On failure `image` holds its old pixels.
 RF_API RF_MUST_USE RfResult rf_optimize_still(const RfExemplar *exemplar, const RfOptimizeOptions *options,
                                               const RfOptimizeConstraints *constraints, const RfImageView *image);
+
+typedef struct RfOptimize RfOptimize;
+
+/// As the functions of the same names of RfLagrangian. The first step makes a still texture; later ones carry it and
+/// mend it where the flow deforms it.
+RF_API RF_MUST_USE RfResult rf_optimize_create(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                                               RfOptimize **out);
+RF_API RF_MUST_USE RfResult rf_optimize_step(RfOptimize *optimize, const RfFlowView *flow, const RfImageView *frame);
+RF_API RF_MUST_USE RfResult rf_optimize_advance(RfOptimize *optimize, const RfFlowView *flow, int width, int height);
+
+/// What the last step did. Times are seconds of this step.
+typedef struct RfOptimizeStats
+{
+    int windows;
+    /// The rms difference of windows to their matches, in parts of the exemplar's range.
+    double energy;
+    double carry_seconds, search_seconds, draw_seconds;
+} RfOptimizeStats;
+
+RF_API RfOptimizeStats rf_optimize_stats(const RfOptimize *optimize);
+RF_API RF_MUST_USE RfResult rf_optimize_save(const RfOptimize *optimize, void **block, size_t *size);
+RF_API RF_MUST_USE RfResult rf_optimize_load(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                                             const void *block, size_t size, RfOptimize **out);
+RF_API void rf_optimize_destroy(RfOptimize *optimize);

@@ -275,7 +275,7 @@ static bool is_turned(const Still *s)
     return s->bounds[s->level].turns != NULL;
 }
 
-static RfResult search_step(Still *s, int round, bool all, double *energy)
+static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *energy)
 {
     RfSynthesisSearch search = {
         .exemplar = &s->material.levels[s->level],
@@ -352,12 +352,12 @@ static RfResult run_windows(Still *s, int window, bool start)
     int iterations = iterations_of(s, s->level, window);
     for (int i = 0; i < iterations; ++i)
     {
-        double energy;
+        RfSynthesisEnergy energy;
         RF_TRY(search_step(s, i, i == 0 || s->windows, &energy));
         if (s->options->spread > 0)
-            set_prices(s, energy);
+            set_prices(s, energy.mean);
         RF_TRY(assign_step(s, true, i == 0 || s->windows));
-        RF_TRY(tell(s, i, iterations, energy));
+        RF_TRY(tell(s, i, iterations, energy.mean));
     }
     return RF_OK;
 }
@@ -440,14 +440,52 @@ static void draw_row(void *context, int y, int worker)
     }
 }
 
-static RfResult make_still(Still *s, const RfExemplar *exemplar, const RfImageView *image)
+static void free_still(Still *s)
+{
+    rf_synthesis_frame_free(&s->frame);
+    rf_windows_destroy(s->windows);
+    rf_release(s->prices);
+    for (int l = 0; l < RF_SYNTHESIS_LEVELS; ++l)
+        free_bounds(&s->bounds[l]);
+    rf_synthesis_material_free(&s->material);
+    rf_release(s);
+}
+
+static RfResult run_still(Still *s, const RfExemplar *exemplar, int width, int height)
 {
     RF_TRY(rf_progress("preparing the exemplar", 0));
     RF_TRY(rf_synthesis_material_create(exemplar, s->options->levels, s->options->similar, &s->material));
-    RF_TRY(make_bounds(s, image->width, image->height));
-    RF_TRY(run_levels(s));
-    Drawing drawing = {s, image};
-    rf_parallel_for(image->height, draw_row, &drawing);
+    RF_TRY(make_bounds(s, width, height));
+    return run_levels(s);
+}
+
+static RfResult make_still(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                           const RfOptimizeConstraints *constraints, int width, int height, Still **out)
+{
+    static const RfOptimizeConstraints none;
+    *out = NULL;
+    Still *s = rf_allocate_zero(1, sizeof *s);
+    if (!s)
+        return RF_OUT_OF_MEMORY;
+    s->options = options;
+    s->constraints = constraints ? constraints : &none;
+    RfResult result = run_still(s, exemplar, width, height);
+    if (result == RF_OK)
+        *out = s;
+    else
+        free_still(s);
+    return result;
+}
+
+RfResult rf_optimize_start(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                           const RfOptimizeConstraints *constraints, int width, int height, RfOptimizeStart *out)
+{
+    Still *s;
+    RF_TRY(make_still(exemplar, options, constraints, width, height, &s));
+    *out = (RfOptimizeStart){s->material, s->frame, s->usage, s->first_energy, s->side};
+    s->material = (RfSynthesisMaterial){0};
+    s->frame = (RfSynthesisFrame){0};
+    free_still(s);
     return RF_OK;
 }
 
@@ -456,19 +494,10 @@ RfResult rf_optimize_still(const RfExemplar *exemplar, const RfOptimizeOptions *
 {
     RF_REQUIRE(exemplar && options && image && image->pixels, "rf_optimize_still: exemplar, options or image is NULL");
     RF_TRY(rf_optimize_check(options));
-    static const RfOptimizeConstraints none;
-    Still *s = rf_allocate_zero(1, sizeof *s);
-    if (!s)
-        return RF_OUT_OF_MEMORY;
-    s->options = options;
-    s->constraints = constraints ? constraints : &none;
-    RfResult result = make_still(s, exemplar, image);
-    rf_synthesis_frame_free(&s->frame);
-    rf_windows_destroy(s->windows);
-    rf_release(s->prices);
-    for (int l = 0; l < RF_SYNTHESIS_LEVELS; ++l)
-        free_bounds(&s->bounds[l]);
-    rf_synthesis_material_free(&s->material);
-    rf_release(s);
-    return result;
+    Still *s;
+    RF_TRY(make_still(exemplar, options, constraints, image->width, image->height, &s));
+    Drawing drawing = {s, image};
+    rf_parallel_for(image->height, draw_row, &drawing);
+    free_still(s);
+    return RF_OK;
 }
