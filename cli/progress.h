@@ -31,6 +31,11 @@ void progress_frame(Progress *progress, int frame, double seconds, const Stage *
 void progress_clear(Progress *progress);
 void progress_done(Progress *progress);
 
+/// Of one long computation in place of frames: `fraction` of it is done.
+void progress_part(Progress *progress, const char *stage, double fraction);
+/// Its end. seconds: of computing alone.
+void progress_still(Progress *progress, double seconds, double energy);
+
 /// In place of a run whose frames are all there.
 void progress_nothing_left(const Settings *settings, int total);
 
