@@ -167,9 +167,11 @@ void progress_part(Progress *progress, const char *stage, double fraction)
 {
     double now = now_seconds(), silent = now - progress->told, elapsed = now - progress->started;
     bool bar = progress->kind == PROGRESS_BAR;
-    if (progress->kind == PROGRESS_NONE || silent < (bar ? g_bar_every : g_line_every))
+    bool nothing_new = !bar && fraction <= progress->fraction;
+    if (progress->kind == PROGRESS_NONE || nothing_new || silent < (bar ? g_bar_every : g_line_every))
         return;
     progress->told = now;
+    progress->fraction = fraction;
     if (progress->kind == PROGRESS_JSON)
     {
         fputs("{\"event\":\"stage\",", stderr);

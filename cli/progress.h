@@ -15,6 +15,8 @@ typedef struct Progress
     double first_seconds, later_seconds;
     double started, told;
     int last_frame;
+    /// The last part told.
+    double fraction;
 } Progress;
 
 double now_seconds(void);
