@@ -392,7 +392,8 @@ static void draw_row(void *context, int y, int worker)
             continue;
         }
         RfVec2 turn = turned ? flow_turn(flow, f->width, f->height, (RfVec2){(float)x, (float)y}) : (RfVec2){1, 0};
-        rf_optimize_sample(&d->o->start.material, f->sources[(ptrdiff_t)y * f->width + x], turned ? &turn : NULL,
+        const int16_t *mean = d->o->options.form == RF_FORM_MEAN ? rf_fixed_at(&f->picture, x, y) : NULL;
+        rf_optimize_sample(&d->o->start.material, f->sources[(ptrdiff_t)y * f->width + x], turned ? &turn : NULL, mean,
                            values);
     }
 }

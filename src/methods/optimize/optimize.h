@@ -21,5 +21,7 @@ RfResult rf_optimize_start(const RfExemplar *exemplar, const RfOptimizeOptions *
                            const RfOptimizeConstraints *constraints, int width, int height, RfOptimizeStart *out);
 
 /// Samples all made channels of the exemplar: the pixel at whole places, between them by a cubic that meets the pixels.
-/// turn: how directions lie in the frame, as in RfSynthesisWindow; NULL: as in the exemplar.
-void rf_optimize_sample(const RfSynthesisMaterial *material, RfVec2 source, const RfVec2 *turn, float *values);
+/// turn: how directions lie in the frame, as in RfSynthesisWindow; NULL: as in the exemplar. mean: a pixel of the frame
+/// on the finest level, which stands in for the channels that are compared; NULL: none.
+void rf_optimize_sample(const RfSynthesisMaterial *material, RfVec2 source, const RfVec2 *turn, const int16_t *mean,
+                        float *values);
