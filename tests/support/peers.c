@@ -106,11 +106,12 @@ static bool is_copy(const float *a, ptrdiff_t a_stride, const float *b, ptrdiff_
 {
     float sum = 0;
     for (int y = 0; y < VERBATIM_SIDE && sum <= limit; ++y)
+    {
+        const float *from = a + y * a_stride, *to = b + y * b_stride;
+#pragma omp simd reduction(+ : sum)
         for (int i = 0; i < numbers; ++i)
-        {
-            float d = a[y * a_stride + i] - b[y * b_stride + i];
-            sum += d * d;
-        }
+            sum += (from[i] - to[i]) * (from[i] - to[i]);
+    }
     return sum <= limit;
 }
 
