@@ -194,7 +194,7 @@ static Loss loss_of(const char *name, int size, bool tiles, int count)
     Loss loss = {0, 0, 0};
     read_builtin(name, size);
     open_pyramid(&p, size, size, tiles, LEVELS, count);
-    for (uint64_t i = 0; i < (TEST_SANITIZED ? 10 : 40); ++i)
+    for (uint64_t i = 0; i < (TEST_SANITIZED ? 10 : 25); ++i)
     {
         int x = (int)rf_random_below((uint32_t)size, 3, 0, i, 0), y = (int)rf_random_below((uint32_t)size, 3, 0, i, 1);
         int u = (int)rf_random_below((uint32_t)size, 3, 0, i, 2), v = (int)rf_random_below((uint32_t)size, 3, 0, i, 3);
@@ -278,6 +278,7 @@ static void places_of_a_list_keep_apart_lie_inside_and_get_no_better(void **stat
 static void tiny_pictures_have_lists_too(void **state)
 {
     (void)state;
+    rf_set_threads(1);
     for (int w = 1; w <= 12; ++w)
         for (int h = 1; h <= 12; h += 3)
             for (int tiles = 0; tiles < 2; ++tiles)
@@ -289,6 +290,7 @@ static void tiny_pictures_have_lists_too(void **state)
                     check_lists(&p, l);
                 close_pyramid(&p);
             }
+    rf_set_threads(0);
 }
 
 static void the_best_places_go_with_a_picture_that_is_shifted_round_its_borders(void **state)

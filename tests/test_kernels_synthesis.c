@@ -267,47 +267,50 @@ static void check_piece(const RfSynthesisExemplar *e, RfSynthesisFrame *f, const
         assert_true(f->windows[i].cost == 0);
 }
 
+static void keep_as_it_is(const RfSynthesisExemplar *e, const RfWindowDatabase *windows, bool mean, bool robust)
+{
+    // One that tiles is its own frame, shifted round its borders.
+    RfSynthesisFrame f = e->tiles ? make_piece(e, 44, 39, true, 13, 30, 2) : make_piece(e, 33, 29, false, 8, 5, 2);
+    RfVec2 sources[44 * 39];
+    int pixels = f.width * f.height;
+    for (int i = 0; i < pixels; ++i)
+        f.sources[i] =
+            (RfVec2){(float)rf_wrap_int((int)f.sources[i].x, 44), (float)rf_wrap_int((int)f.sources[i].y, 39)};
+    memcpy(sources, f.sources, (size_t)pixels * sizeof *sources);
+    for (uint64_t round = 0; round < 2; ++round)
+    {
+        double energy = search_with((RfSynthesisSearch){.exemplar = e,
+                                                        .frame = &f,
+                                                        .side = SIDE,
+                                                        .windows = windows,
+                                                        .keep = 1,
+                                                        .plain = true,
+                                                        .all = true,
+                                                        .round = round});
+        assert_true(energy == 0);
+        assign_with(
+            (RfSynthesisAssign){.exemplar = e, .frame = &f, .side = SIDE, .mean = mean, .robust = robust, .all = true});
+        for (int i = 0; i < window_count(&f) && !e->tiles; ++i)
+            assert_false(f.stirred[i]);
+        for (int i = 0; i < pixels; ++i)
+            f.sources[i] = (RfVec2){(float)rf_wrap_int((int)lrintf(f.sources[i].x), 44),
+                                    (float)rf_wrap_int((int)lrintf(f.sources[i].y), 39)};
+        check_piece(e, &f, sources);
+    }
+    rf_synthesis_frame_free(&f);
+}
+
 // Whatever the search and the form: nothing can be better, so nothing changes.
 static void a_piece_of_the_exemplar_is_a_fixed_point(void **state)
 {
     (void)state;
-    for (int round = 0; round < 16; ++round)
+    for (int tiles = 0; tiles < 2; ++tiles)
     {
-        bool tiles = round & 1, exact = round & 2, mean = round & 4, robust = round & 8;
         RfSynthesisExemplar e = make_exemplar(44, 39, CHANNELS, tiles, 5);
-        // One that tiles is its own frame, shifted round its borders.
-        RfSynthesisFrame f = tiles ? make_piece(&e, 44, 39, true, 13, 30, 2) : make_piece(&e, 33, 29, false, 8, 5, 2);
-        RfWindowDatabase *windows = exact ? all_windows(&e, SIDE) : NULL;
-        RfVec2 *sources = malloc((size_t)(f.width * f.height) * sizeof *sources);
-        for (int i = 0; i < f.width * f.height && tiles; ++i)
-            f.sources[i] =
-                (RfVec2){(float)rf_wrap_int((int)f.sources[i].x, 44), (float)rf_wrap_int((int)f.sources[i].y, 39)};
-        memcpy(sources, f.sources, (size_t)(f.width * f.height) * sizeof *sources);
-        for (int i = 0; i < 2; ++i)
-        {
-            double energy = search_with((RfSynthesisSearch){.exemplar = &e,
-                                                            .frame = &f,
-                                                            .side = SIDE,
-                                                            .windows = windows,
-                                                            .keep = 1,
-                                                            .plain = true,
-                                                            .all = true,
-                                                            .round = (uint64_t)i});
-            assert_true(energy == 0);
-            assign_with((RfSynthesisAssign){
-                .exemplar = &e, .frame = &f, .side = SIDE, .mean = mean, .robust = robust, .all = true});
-            for (int k = 0; k < f.width * f.height; ++k)
-            {
-                f.sources[k].x = (float)rf_wrap_int((int)lrintf(f.sources[k].x), 44);
-                f.sources[k].y = (float)rf_wrap_int((int)lrintf(f.sources[k].y), 39);
-            }
-            check_piece(&e, &f, sources);
-            for (int k = 0; k < window_count(&f) && !tiles; ++k)
-                assert_false(f.stirred[k]);
-        }
-        free(sources);
+        RfWindowDatabase *windows = all_windows(&e, SIDE);
+        for (int i = 0; i < 8; ++i)
+            keep_as_it_is(&e, i & 1 ? windows : NULL, i & 2, i & 4);
         rf_windows_destroy(windows);
-        rf_synthesis_frame_free(&f);
         rf_synthesis_exemplar_free(&e);
     }
 }
