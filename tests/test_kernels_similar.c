@@ -278,7 +278,6 @@ static void places_of_a_list_keep_apart_lie_inside_and_get_no_better(void **stat
 static void tiny_pictures_have_lists_too(void **state)
 {
     (void)state;
-    rf_set_threads(1);
     for (int w = 1; w <= 12; ++w)
         for (int h = 1; h <= 12; h += 3)
             for (int tiles = 0; tiles < 2; ++tiles)
@@ -290,7 +289,6 @@ static void tiny_pictures_have_lists_too(void **state)
                     check_lists(&p, l);
                 close_pyramid(&p);
             }
-    rf_set_threads(0);
 }
 
 static void the_best_places_go_with_a_picture_that_is_shifted_round_its_borders(void **state)
@@ -325,6 +323,14 @@ static void the_best_places_go_with_a_picture_that_is_shifted_round_its_borders(
     close_pyramid(&b);
 }
 
+// Many threads on small pictures wait for each other most of the time; bytes for any number are test_optimize's.
+static int one_thread(void **state)
+{
+    (void)state;
+    rf_set_threads(1);
+    return 0;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -334,5 +340,5 @@ int main(void)
         cmocka_unit_test(tiny_pictures_have_lists_too),
         cmocka_unit_test(the_best_places_go_with_a_picture_that_is_shifted_round_its_borders),
     };
-    return cmocka_run_group_tests_name("similar", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("similar", tests, one_thread, NULL);
 }
