@@ -47,9 +47,17 @@ static RfPlace inside(const Lists *l, int x, int y)
     return (RfPlace){bring_inside(l, x, l->picture->width), bring_inside(l, y, l->picture->height)};
 }
 
-static bool is_near(RfPlace a, RfPlace b)
+// Of two indices, round the border if the picture tiles.
+static int distance_along(const Lists *l, int a, int b, int n)
 {
-    return a.x - b.x < APART && b.x - a.x < APART && a.y - b.y < APART && b.y - a.y < APART;
+    int d = a < b ? b - a : a - b;
+    return l->tiles ? rf_min_int(d, n - d) : d;
+}
+
+static bool is_near(const Lists *l, RfPlace a, RfPlace b)
+{
+    return distance_along(l, a.x, b.x, l->picture->width) < APART &&
+           distance_along(l, a.y, b.y, l->picture->height) < APART;
 }
 
 static const int16_t *corner(const Lists *l, RfPlace centre)
@@ -61,17 +69,17 @@ static const int16_t *corner(const Lists *l, RfPlace centre)
 static void consider(const Lists *l, RfPlace own, const RfFixedQuery *query, RfPlace place, Found *found, int *count)
 {
     int wanted = l->similar->count;
-    if (is_near(place, own))
+    if (is_near(l, place, own))
         return;
     const int16_t *candidate = corner(l, place);
     float distance = 0;
     rf_fixed_least(query, &candidate, NULL, 1, &distance);
     int kept = 0;
     for (int i = 0; i < *count; ++i)
-        if (is_near(found[i].place, place) && found[i].distance <= distance)
+        if (is_near(l, found[i].place, place) && found[i].distance <= distance)
             return;
     for (int i = 0; i < *count; ++i)
-        if (!is_near(found[i].place, place))
+        if (!is_near(l, found[i].place, place))
             found[kept++] = found[i];
     int at = kept;
     while (at > 0 && found[at - 1].distance > distance)

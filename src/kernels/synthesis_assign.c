@@ -27,6 +27,8 @@ enum
 static const float FALL_OFF = 0.4f;
 // The exponent r of the energy where it is robust (Kwatra et al. 2005).
 static const float ROBUST_EXPONENT = 0.8f;
+// Keeps exact matches from weighing without end: in fixed point, where an exemplar's range is 1020, a 255th of it.
+static const float LEAST_DIFFERENCE = 4;
 
 typedef struct Vote
 {
@@ -342,9 +344,7 @@ RfResult rf_synthesis_assign(const RfSynthesisAssign *assign)
         a->reach = (half + f->spacing - 1) / f->spacing;
         a->half = (float)half + 0.5f;
         a->channels = assign->exemplar->channels - assign->guides;
-        // One grey level a number keeps exact matches from weighing without end.
-        float level = assign->exemplar->scale / 255;
-        a->smallest_cost = (float)numbers * level * level;
+        a->smallest_cost = (float)numbers * LEAST_DIFFERENCE * LEAST_DIFFERENCE;
         assert((2 * a->reach + 1) * (2 * a->reach + 1) <= MAX_VOTES);
         make_fall(a, assign->side);
         rf_parallel_for(f->rows, assign_row, a);

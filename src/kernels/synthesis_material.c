@@ -18,6 +18,7 @@ enum
 
 // Targets and guides may leave the exemplar's range by this much before they are clamped.
 static const float RANGE_TO_SPARE = 1.2f;
+static const float LEAST_RANGE = 1e-15f;
 
 static bool same_channel(const RfExemplar *e, int a, int b)
 {
@@ -80,7 +81,8 @@ static float scale_of(RfSynthesisMaterial *m)
         range_of(m->exemplar, m->from[i], &low, &high);
         m->widest = rf_max(m->widest, (high - low) * m->factor[i]);
     }
-    m->widest = rf_max(m->widest, 1e-20f);
+    // Squares of the scale, and squared differences times it, stay finite where nothing differs.
+    m->widest = rf_max(m->widest, LEAST_RANGE);
     return RF_FIXED_RANGE / RANGE_TO_SPARE / m->widest;
 }
 
