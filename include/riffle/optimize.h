@@ -42,7 +42,7 @@ typedef struct RfOptimizeOptions
     uint32_t struct_size;
     /// Same seed and same input: same bytes, with any number of threads. Default 1.
     uint64_t seed;
-    /// Of the pyramid, 1 to 10; 0 picks them by the exemplar's size: as many as leave fewer than 18 pixels on the
+    /// Of the pyramid, 1 to 10; 0 picks them by the exemplar's size: as many as leave 32 pixels or fewer on the
     /// coarsest one's shorter side, 3 at least. Default 0. More keep larger structures together.
     int levels;
     /// Sides of the windows, odd, 5 to 33 pixels, used one after the other on every level; 0 ends them. Default 17, 9.
