@@ -55,6 +55,12 @@ static void print_generic(const GenericOption *option)
 static void describe_range(const RfOption *option, char *text, size_t size)
 {
     const char *unit = option->unit && option->unit[0] ? option->unit : "";
+    if (option->kind == RF_OPTION_INTS)
+    {
+        snprintf(text, size, "[%s; 1 to %d numbers, %g to %g%s%s]", option->choices, RF_MAX_OPTION_INTS,
+                 option->minimum, option->maximum, unit[0] ? " " : "", unit);
+        return;
+    }
     if (option->kind == RF_OPTION_FLOAT || option->kind == RF_OPTION_INT)
         snprintf(text, size, "[%g; %g to %g%s%s]", option->default_value, option->minimum, option->maximum,
                  unit[0] ? " " : "", unit);
@@ -69,6 +75,8 @@ static const char *placeholder(const RfOption *option)
 {
     if (option->kind == RF_OPTION_BOOL)
         return "[=yes|no]";
+    if (option->kind == RF_OPTION_INTS)
+        return " N,N,...";
     if (option->unit && strcmp(option->unit, "px") == 0)
         return " PX";
     if (option->unit && strcmp(option->unit, "s") == 0)
@@ -133,7 +141,7 @@ void print_verb_help(const Verb *verb)
     if (verb->table)
     {
         const RfOption *table = verb->table(&count);
-        printf("\nHow it measures (default; range):\n");
+        printf("\n%s (default; range):\n", verb->heading);
         print_table(table, count, verb->bit);
     }
     if (verb->bit != VERB_TEXTURE)

@@ -17,26 +17,32 @@ static const Verb g_verbs[] = {
      "A map named normal holds x right, y up and z out in 0 to 1 (0.5 is 0; green is up, as in OpenGL), motion or\n"
      "velocity two channels x right, y down: both are turned with the texture. alpha is opacity; all others are "
      "data.\n",
-     NULL, run_texture},
+     NULL, NULL, run_texture},
+    {"synth", VERB_SYNTH, "EXEMPLAR OUTPUT", 2, false, "a still texture of any size",
+     "OUTPUT is one picture (png, exr, npy), null:, md5: or -. Maps of the exemplar other than colour and alpha are\n"
+     "written as OUTPUT.NAME.exr beside PNG, and all in one file where OUTPUT is EXR or NPY. IMAGEs that say "
+     "something\n"
+     "of the result have its size.\n",
+     synth_option_table, "How it is made", run_synth},
     {"render", VERB_RENDER, "INPUT OUTPUT", 2, false, "show a flow or a field of heights as images or video",
      "INPUT is a flow, or for --as relief images: heights from 0 to 1 (a channel named height, else the first), or\n"
      "colours with --map height=FRAMES. A steady flow fills one name without a number (out.png), or 100 frames.\n",
-     NULL, run_render},
+     NULL, NULL, run_render},
     {"measure", VERB_MEASURE, "FRAMES", 1, false,
      "judge any program's frames: do they follow the flow, are they the texture",
      "With --flow: the flow error and flicker; with --exemplar: spectrum, patches, contrast; always: holes. Each "
      "error\n"
      "stands beside its floor, the same measure where nothing is wrong. One still picture is judged by its exemplar.\n",
-     rf_measure_option_table, run_measure},
+     rf_measure_option_table, "How it measures", run_measure},
     {"convert", VERB_CONVERT, "INPUT OUTPUT", 2, false, "between the formats of one kind of data",
      "Images become png, exr, npy or a video; 2D flows become flo, npy, exr or vti, a file a moment where the name "
      "has\n"
      "a number in it; out.npy takes all moments as [T, H, W, 2].\n",
-     NULL, run_convert},
+     NULL, NULL, run_convert},
     {"info", VERB_INFO, "FILE...", 1, true, "what is in it: kind, size, channels, range, time, conventions",
      "Of an image also: whether it tiles, and which particle radius it has room for as an exemplar; whether it can be\n"
      "a flow.\n",
-     NULL, run_info},
+     NULL, NULL, run_info},
 };
 
 enum

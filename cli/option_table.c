@@ -123,12 +123,6 @@ static int set_velocity_scale(Settings *settings, const char *value)
     return set_double("velocity-scale", value, -1e6, 1e6, &settings->velocity_scale);
 }
 
-static int set_mask(Settings *settings, const char *value)
-{
-    settings->mask = value;
-    return CODE_DONE;
-}
-
 static int set_seed(Settings *settings, const char *value)
 {
     if (!text_to_uint64(value, &settings->seed))
@@ -258,17 +252,21 @@ static int set_full_speed(Settings *settings, const char *value)
     return set_double("full-speed", value, 0, 1e6, &settings->full_speed);
 }
 
-static int set_flow(Settings *settings, const char *value)
-{
-    settings->flow = value;
-    return CODE_DONE;
-}
-
-static int set_exemplar(Settings *settings, const char *value)
-{
-    settings->exemplar = value;
-    return CODE_DONE;
-}
+/// A file's name, looked at when it is opened.
+#define FILE_SETTER(field)                                                                                             \
+    static int set_##field(Settings *settings, const char *value)                                                      \
+    {                                                                                                                  \
+        settings->field = value;                                                                                       \
+        return CODE_DONE;                                                                                              \
+    }
+FILE_SETTER(mask)
+FILE_SETTER(flow)
+FILE_SETTER(exemplar)
+FILE_SETTER(fixed)
+FILE_SETTER(target)
+FILE_SETTER(guide)
+FILE_SETTER(orientation_map)
+FILE_SETTER(scale_map)
 
 static int set_report(Settings *settings, const char *value)
 {
@@ -311,33 +309,54 @@ FLAG_SETTER(verbose)
 FLAG_SETTER(help)
 
 static const GenericOption g_options[] = {
-    {"output", 'o', "OUTPUT", VERBS_WITH_FRAMES, "", "one more output of the same run", set_output},
+    {"output", 'o', "OUTPUT", VERBS_WITH_OUTPUTS, "", "one more output of the same run", set_output},
     {"flow", 0, "FLOW", VERB_MEASURE, "",
      "what the frames should follow, built-in ones too; frame numbers are its moments' (first + n K of --moment-every)",
      set_flow},
     {"exemplar", 0, "IMAGE", VERB_MEASURE, "", "what the frames should look like", set_exemplar},
     {"report", 0, "FILE", VERB_MEASURE, "",
      "all numbers as .json, or a page with plots and pictures as .html; may be given several times", set_report},
-    {"frames", 0, "A-B[xS]", VERBS_WITH_PROGRESS, "all; 100 of a steady or endless flow",
+    {"frames", 0, "A-B[xS]", VERBS_WITH_NUMBERS, "all; 100 of a steady or endless flow",
      "which frames, counted from the first file's number (a flow: moment n is frame first + n K of --moment-every); A "
      "starts afresh, xS writes every S-th",
      set_frames},
-    {"size", 0, "WxH", VERB_TEXTURE | VERB_RENDER, "the input's cells", "output pixels, each side 1 to 32768",
+    {"size", 0, "WxH", VERB_TEXTURE | VERB_RENDER | VERB_SYNTH,
+     "the input's cells; synth: as --fixed and the like, else twice the exemplar's",
+     "output pixels, each side 1 to "
+     "32768",
      set_size},
-    {"fps", 0, "F", VERBS_ALL, "24", "frames a second, 0.01 to 10000", set_fps},
-    {"velocity-scale", 0, "S", VERBS_ALL, "1", "multiplies every velocity", set_velocity_scale},
-    {"moment-every", 0, "K", VERBS_ALL, "1", "frames from one moment of the flow to the next, 1 to 1000000",
+    {"fps", 0, "F", VERBS_WITH_FLOWS, "24", "frames a second, 0.01 to 10000", set_fps},
+    {"velocity-scale", 0, "S", VERBS_WITH_FLOWS, "1", "multiplies every velocity", set_velocity_scale},
+    {"moment-every", 0, "K", VERBS_WITH_FLOWS, "1", "frames from one moment of the flow to the next, 1 to 1000000",
      set_moment_every},
-    {"variables", 0, "U,V", VERBS_ALL, "found by name", "names of the components in NetCDF, VTK, EXR", set_variables},
+    {"variables", 0, "U,V", VERBS_WITH_FLOWS, "found by name", "names of the components in NetCDF, VTK, EXR",
+     set_variables},
     {"mask", 0, "IMAGE", VERB_TEXTURE | VERB_MEASURE, "the flow's own",
      "white is fluid; stands in for the flow's own mask", set_mask},
     {"method", 0, "NAME", VERB_TEXTURE, "lagrangian", "how to texture; each is described below", set_method},
     {"preset", 0, "NAME", VERB_TEXTURE, "default", "where the method's options start from", set_preset},
-    {"map", 0, "NAME=IMAGE", VERB_TEXTURE | VERB_RENDER, "",
-     "a further registered map of the exemplar (height, normal, motion, alpha, ...); render: height=FRAMES", set_map},
-    {"map-weight", 0, "NAME=W", VERB_TEXTURE, "1", "of the map's differences when areas are compared", set_map_weight},
-    {"exemplar-tiles", 0, "auto|no|yes", VERB_TEXTURE, "auto", "does the exemplar continue across opposite borders",
-     set_tiling},
+    {"map", 0, "NAME=IMAGE", VERB_TEXTURE | VERB_RENDER | VERB_SYNTH, "",
+     "a further registered map of the exemplar (height, normal, motion, alpha, ...); render: height=FRAMES; synth: one "
+     "named guide belongs to --guide",
+     set_map},
+    {"map-weight", 0, "NAME=W", VERB_TEXTURE | VERB_SYNTH, "1", "of the map's differences when areas are compared",
+     set_map_weight},
+    {"exemplar-tiles", 0, "auto|no|yes", VERB_TEXTURE | VERB_SYNTH, "auto",
+     "does the exemplar continue across opposite borders", set_tiling},
+    {"fixed", 0, "IMAGE", VERB_SYNTH, "",
+     "its opaque pixels stay, transparent ones (alpha under half) are made: fills holes", set_fixed},
+    {"target", 0, "IMAGE[@W]", VERB_SYNTH, "@1",
+     "what the result should look like from afar; W: a number, 1 counts as much as the exemplar, or an image of "
+     "weights 0 to 1",
+     set_target},
+    {"guide", 0, "IMAGE", VERB_SYNTH, "",
+     "what should be where, in the terms of the exemplar's map of that name (--map guide=IMAGE)", set_guide},
+    {"orientation-map", 0, "IMAGE", VERB_SYNTH, "",
+     "turns the exemplar clockwise: grey 0 to 1 is 0 to 360 degrees, EXR holds degrees", set_orientation_map},
+    {"scale-map", 0, "IMAGE", VERB_SYNTH, "",
+     "how large the exemplar appears: mid-grey as it is, black a quarter, white four times; EXR holds the factor, 1/16 "
+     "to 16",
+     set_scale_map},
     {"shader", 0, "none|fire|clouds", VERB_TEXTURE, "none", "turns blended noise into fire or clouds", set_shader},
     {"uv", 0, NULL, VERB_TEXTURE, "",
      "also write OUTPUT.uv.%04d.exr, float: u0 v0 weight0 id0 ... u3 v3 weight3 id3, the four strongest grids of each "
@@ -349,7 +368,7 @@ static const GenericOption g_options[] = {
     {"full-speed", 0, "V", VERB_RENDER, "the greatest of the run's frames, looked for first",
      "cells a frame that get full saturation or the longest arrow, the same in all frames; faster ones are darkened",
      set_full_speed},
-    {"seed", 0, "N", VERB_TEXTURE | VERB_RENDER, "1", "same seed and inputs: same bytes", set_seed},
+    {"seed", 0, "N", VERB_TEXTURE | VERB_RENDER | VERB_SYNTH, "1", "same seed and inputs: same bytes", set_seed},
     {"threads", 0, "N", VERBS_ALL, "all", "1 to 256; results do not depend on it", set_threads},
     {"resume", 0, NULL, VERBS_WITH_FRAMES, "", "continue a stopped run; a finished one stays as it is", set_resume},
     {"replace", 'y', NULL, VERBS_WITH_PROGRESS, "refuse", "replace outputs that are there", set_replace},

@@ -67,7 +67,11 @@ static int parse_method_option(Parser *parser, const char *word, const char *nam
     const char *value = equals ? equals + 1 : "yes";
     if (option->kind != RF_OPTION_BOOL)
     {
-        int code = take_value(parser, word, equals, option->choices ? option->choices : "a number", &value);
+        int code = take_value(parser, word, equals,
+                              option->kind == RF_OPTION_INTS ? "numbers, as 17,9"
+                              : option->choices              ? option->choices
+                                                             : "a number",
+                              &value);
         if (code)
             return code;
     }
@@ -229,6 +233,29 @@ static int set_number(void *field, const RfOption *option, const char *text)
     return CODE_DONE;
 }
 
+/// "17,9"
+static int set_ints(void *field, const RfOption *option, const char *text)
+{
+    int values[RF_MAX_OPTION_INTS] = {0}, count = 0;
+    for (const char *at = text;; ++at)
+    {
+        char number[16];
+        size_t length = strcspn(at, ",");
+        snprintf(number, sizeof number, "%.*s", (int)(length < sizeof number ? length : sizeof number - 1), at);
+        if (count == RF_MAX_OPTION_INTS)
+            return fail(CODE_USAGE, NULL, NULL, "--%s %s: at most %d numbers", option->name, text, RF_MAX_OPTION_INTS);
+        if (!text_to_int(number, &values[count]) || values[count] < option->minimum || values[count] > option->maximum)
+            return fail(CODE_USAGE, NULL, NULL, "--%s %s: must be whole numbers, %g to %g, as %s", option->name, text,
+                        option->minimum, option->maximum, option->choices);
+        ++count;
+        at += length;
+        if (*at == '\0')
+            break;
+    }
+    memcpy(field, values, sizeof values);
+    return CODE_DONE;
+}
+
 static int set_field(void *options, const RfOption *option, const char *text)
 {
     void *field = (unsigned char *)options + option->offset;
@@ -240,6 +267,8 @@ static int set_field(void *options, const RfOption *option, const char *text)
         return set_bool(field, option, text);
     case RF_OPTION_UINT64:
         return set_uint64(field, option, text);
+    case RF_OPTION_INTS:
+        return set_ints(field, option, text);
     case RF_OPTION_FLOAT:
     case RF_OPTION_INT:
         break;

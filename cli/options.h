@@ -22,9 +22,13 @@ enum
     VERB_CONVERT = 4,
     VERB_INFO = 8,
     VERB_MEASURE = 16,
+    VERB_SYNTH = 32,
     VERBS_WITH_FRAMES = VERB_TEXTURE | VERB_RENDER | VERB_CONVERT,
-    VERBS_WITH_PROGRESS = VERBS_WITH_FRAMES | VERB_MEASURE,
-    VERBS_ALL = VERBS_WITH_PROGRESS | VERB_INFO
+    VERBS_WITH_OUTPUTS = VERBS_WITH_FRAMES | VERB_SYNTH,
+    VERBS_WITH_NUMBERS = VERBS_WITH_FRAMES | VERB_MEASURE,
+    VERBS_WITH_FLOWS = VERBS_WITH_NUMBERS | VERB_INFO,
+    VERBS_WITH_PROGRESS = VERBS_WITH_NUMBERS | VERB_SYNTH,
+    VERBS_ALL = VERBS_WITH_FLOWS | VERB_SYNTH
 };
 
 typedef enum ProgressKind
@@ -74,6 +78,8 @@ typedef struct Verb
     const char *notes;
     /// Options of its own; NULL where it has none (the methods of `texture` have theirs).
     const RfOption *(*table)(int *count);
+    /// Over them in the help: "How it measures".
+    const char *heading;
     int (*run)(struct Settings *settings);
 } Verb;
 
@@ -124,6 +130,9 @@ typedef struct Settings
     const char *flow, *exemplar;
     const char *reports[MAX_REPORTS];
     int report_count;
+
+    /// Of `synth`; NULL: not given. target: "IMAGE" or "IMAGE@WEIGHT".
+    const char *fixed, *target, *guide, *orientation_map, *scale_map;
 } Settings;
 
 /// Fills the settings from the words after the verb.

@@ -163,6 +163,57 @@ void progress_done(Progress *progress)
                 1e3 * progress->first_seconds, peak_mib(), rf_threads(), rf_threads() == 1 ? "" : "s");
 }
 
+void progress_part(Progress *progress, const char *stage, double fraction)
+{
+    double now = now_seconds(), silent = now - progress->told, elapsed = now - progress->started;
+    bool bar = progress->kind == PROGRESS_BAR;
+    bool nothing_new = !bar && fraction <= progress->fraction;
+    if (progress->kind == PROGRESS_NONE || nothing_new || silent < (bar ? g_bar_every : g_line_every))
+        return;
+    progress->told = now;
+    progress->fraction = fraction;
+    if (progress->kind == PROGRESS_JSON)
+    {
+        fputs("{\"event\":\"stage\",", stderr);
+        print_json_member(stderr, "stage", stage);
+        fputs(",\"fraction\":", stderr);
+        print_json_number(stderr, fraction);
+        fputs("}\n", stderr);
+        return;
+    }
+    char cells[BAR_CELLS + 1], left[32] = "?";
+    int done = (int)(fraction * BAR_CELLS);
+    memset(cells, '.', BAR_CELLS);
+    memset(cells, '#', (size_t)(done < BAR_CELLS ? done : BAR_CELLS));
+    cells[BAR_CELLS] = '\0';
+    if (fraction > 0)
+        format_time(elapsed * (1 - fraction) / fraction, left, sizeof left);
+    if (bar)
+        fprintf(stderr, "\r\033[K[%s] %s  %s left", cells, stage, left);
+    else
+        fprintf(stderr, "%.0f %%: %s, %s left\n", 100 * fraction, stage, left);
+    fflush(stderr);
+}
+
+void progress_still(Progress *progress, double seconds, double energy)
+{
+    progress_clear(progress);
+    if (progress->kind == PROGRESS_JSON)
+    {
+        fputs("{\"event\":\"done\",\"ms\":", stderr);
+        print_json_number(stderr, 1e3 * seconds);
+        fputs(",\"peak_mib\":", stderr);
+        print_json_number(stderr, peak_mib());
+        fprintf(stderr, ",\"threads\":%d,\"energy\":", rf_threads());
+        print_json_number(stderr, energy);
+        fputs("}\n", stderr);
+    }
+    else if (progress->kind != PROGRESS_NONE)
+        fprintf(stderr, "made in %.1f s, %.1f ms to compute; energy %.4f; %.0f MiB, %d thread%s\n",
+                now_seconds() - progress->started, 1e3 * seconds, energy, peak_mib(), rf_threads(),
+                rf_threads() == 1 ? "" : "s");
+}
+
 void progress_nothing_left(const Settings *settings, int total)
 {
     Progress progress;

@@ -15,6 +15,8 @@ typedef struct Progress
     double first_seconds, later_seconds;
     double started, told;
     int last_frame;
+    /// The last part told.
+    double fraction;
 } Progress;
 
 double now_seconds(void);
@@ -30,6 +32,11 @@ void progress_frame(Progress *progress, int frame, double seconds, const Stage *
 /// Removes the bar, so that a line can be printed.
 void progress_clear(Progress *progress);
 void progress_done(Progress *progress);
+
+/// Of one long computation in place of frames: `fraction` of it is done.
+void progress_part(Progress *progress, const char *stage, double fraction);
+/// Its end. seconds: of computing alone.
+void progress_still(Progress *progress, double seconds, double energy);
 
 /// In place of a run whose frames are all there.
 void progress_nothing_left(const Settings *settings, int total);

@@ -118,6 +118,9 @@ void report_print_option(FILE *stream, const RfMeasureOptions *options, const Rf
         fprintf(stream, "%.*s", (int)strcspn(at, "|"), at);
         break;
     }
+    case RF_OPTION_INTS: // the measures have none
+        fputs("null", stream);
+        break;
     }
 }
 

@@ -132,7 +132,8 @@ static uint64_t hash_options(const Texture *texture, uint64_t hash)
 {
     int count = 0;
     const RfOption *table = texture->method->table(&count);
-    static const size_t sizes[] = {sizeof(float), sizeof(int), sizeof(uint64_t), sizeof(bool), sizeof(int)};
+    static const size_t sizes[] = {sizeof(float), sizeof(int), sizeof(uint64_t),
+                                   sizeof(bool),  sizeof(int), RF_MAX_OPTION_INTS * sizeof(int)};
     hash = hash_add_text(hash, texture->method->name);
     for (int i = 0; i < count; ++i)
     {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints a table of the library as Markdown, as it stands in docs/:
 //
-//     options lagrangian|eulerian|dual|sprites|warp|measure|quantities|flow|exemplar
+//     options lagrangian|eulerian|dual|sprites|warp|optimize|measure|quantities|flow|exemplar
 //
 // Options of a method or of the measures, the quantities these give, or the built-in flows or exemplars. A test holds
 // the docs to it (cmake/doc_tables.sh).
@@ -37,6 +37,9 @@ static void print_range(const RfOption *option)
         printf("yes, no");
     else if (option->kind == RF_OPTION_UINT64)
         printf("any whole number");
+    else if (option->kind == RF_OPTION_INTS)
+        printf("up to %d numbers, %g to %g%s%s", RF_MAX_OPTION_INTS, option->minimum, option->maximum,
+               option->unit[0] ? " " : "", option->unit);
     else
         printf("%g to %g%s%s", option->minimum, option->maximum, option->unit[0] ? " " : "", option->unit);
 }
@@ -54,6 +57,8 @@ static void print_options(const RfOption *table, int count)
             print_choice(option, (int)option->default_value);
         else if (option->kind == RF_OPTION_BOOL)
             printf("%s", option->default_value != 0 ? "yes" : "no");
+        else if (option->kind == RF_OPTION_INTS)
+            printf("%s", option->choices);
         else
             printf("%g", option->default_value);
         printf(" | %s |\n", option->sentence);
@@ -108,6 +113,8 @@ int main(int argc, char **argv)
         table = rf_sprites_option_table(&count);
     else if (strcmp(what, "warp") == 0)
         table = rf_warp_option_table(&count);
+    else if (strcmp(what, "optimize") == 0)
+        table = rf_optimize_option_table(&count);
     else if (strcmp(what, "measure") == 0)
         table = rf_measure_option_table(&count);
     else if (strcmp(what, "flow") == 0 || strcmp(what, "exemplar") == 0)
@@ -119,7 +126,8 @@ int main(int argc, char **argv)
     }
     if (!table)
     {
-        fprintf(stderr, "usage: options lagrangian|eulerian|dual|sprites|warp|measure|quantities|flow|exemplar\n");
+        fprintf(stderr,
+                "usage: options lagrangian|eulerian|dual|sprites|warp|optimize|measure|quantities|flow|exemplar\n");
         return 2;
     }
     print_options(table, count);

@@ -102,6 +102,10 @@ static void make_images(void)
     put_image("tiny.png", 4, 4, 3, 0.2f);
     put_image("nan.exr", 32, 32, 3, NAN);
     put_image("small.png", 16, 16, 1, 0.2f);
+    put_image("hole.png", 32, 32, 4, 0.2f);
+    put_image("guide.png", 32, 32, 1, 0.2f);
+    put_image("wide.png", 24, 16, 4, 0.5f);
+    put_image("scale.exr", 32, 32, 1, 99);
     put_image("size.1.png", 32, 32, 3, 0.2f);
     put_image("size.2.png", 16, 16, 3, 0.2f);
     put_image("kind.1.png", 16, 16, 3, 0.2f);
@@ -385,7 +389,7 @@ static void wrong_command_lines_are_refused_with_the_right_one(void **state)
     (void)state;
     static const Case cases[] = {
         {"", 2, "no verb; riffle --help"},
-        {"judge a b", 2, "unknown verb judge; there are: texture, render, measure, convert, info"},
+        {"judge a b", 2, "unknown verb judge; there are: texture, synth, render, measure, convert, info"},
         {"texture", 2, "texture needs FLOW EXEMPLAR OUTPUT: 0 of 3 are given"},
         {FLOW "good.png", 2, "2 of 3 are given"},
         {FLOW "good.png outputs/a.png outputs/b.png", 2, "but \"outputs/b.png\" is left"},
@@ -432,6 +436,96 @@ static void wrong_command_lines_are_refused_with_the_right_one(void **state)
         {"render good.flo outputs/a.png --map height=good.png", 2, "--map belongs to --as relief"},
         {"texture q.%d.flo good.png outputs/a.png --frames 5000x1-2", 2, "--frames 5000x1-2: must be A-B"},
         {"convert good.png outputs/a.png --frames 7-9", 2, "has the frames 1 to 1"},
+    };
+    CHECK(cases);
+}
+
+#define SYNTH "synth good.png outputs/a.png --size 32x32 "
+
+static void what_a_still_cannot_be_made_of_is_refused_with_the_reason(void **state)
+{
+    (void)state;
+    static const Case cases[] = {
+        {"synth", 2, "synth needs EXEMPLAR OUTPUT: 0 of 2 are given"},
+        {"synth missing.png outputs/a.png", 3, "missing.png: "},
+        {"synth cut.png outputs/a.png", 3, "cut.png:row 0: broken PNG"},
+        {"synth tiny.png outputs/a.png", 3, "4 x 4 pixels: each side must be 8 to 32768"},
+        {"synth nan.exr outputs/a.png", 3, "nan.exr:pixel (8, 16), channel R: is NaN"},
+        {"synth height.exr outputs/a.png", 3, "no colour here"},
+        {"synth builtin:vortex outputs/a.png", 3, "builtin:vortex: "},
+        {"synth good.png outputs/a.%04d.png", 2,
+         "outputs/a.%04d.png: a still texture is one picture: leave the number"},
+        {"synth good.png outputs/a.mp4", 2, "outputs/a.mp4: a still texture is one picture: png, exr"},
+        {"synth good.png nowhere/a.png", 1, "nowhere/a.png: cannot be written: No such file or directory; make"},
+        {"synth good.png good.png -y", 2, "good.png: is an input of this run and is never replaced"},
+        {"synth good.png guide.png --fixed hole.png --target guide.png -y", 2, "guide.png: is an input of this run"},
+        {"synth good.png outputs/a.png --size 0x512", 2, "--size 0x512: width must be 1 to 32768"},
+        {"synth good.png outputs/a.png --size 512x99999", 2, "--size 512x99999: height must be 1 to 32768"},
+        {"synth good.png outputs/a.png --size 7x64", 2, "7 x 64 pixels: each side must be 8 to 32768"},
+        {SYNTH "--frames 1-3", 2, "synth has no option --frames"},
+        {SYNTH "--fps 24", 2, "synth has no option --fps"},
+        {SYNTH "--flow good.flo", 2, "synth has no option --flow"},
+        {SYNTH "--mask good.png", 2, "synth has no option --mask"},
+        {SYNTH "--resume", 2, "synth has no option --resume"},
+        {SYNTH "--orient flow", 2, "synth has no option --orient"},
+        {SYNTH "--method warp", 2, "synth has no option --method"},
+        {SYNTH "--windows", 2, "--windows needs a value: numbers, as 17,9"},
+        {SYNTH "--windows 16", 2, "--windows: 16 is even"},
+        {SYNTH "--windows 35", 2, "--windows 35: must be whole numbers, 5 to 33, as 17,9"},
+        {SYNTH "--windows 9,3", 2, "--windows 9,3: must be whole numbers, 5 to 33"},
+        {SYNTH "--windows 9,,7", 2, "--windows 9,,7: must be whole numbers, 5 to 33"},
+        {SYNTH "--windows 9,", 2, "--windows 9,: must be whole numbers, 5 to 33"},
+        {SYNTH "--windows 0", 2, "--windows 0: must be whole numbers, 5 to 33"},
+        {SYNTH "--windows 9.5", 2, "--windows 9.5: must be whole numbers, 5 to 33"},
+        {SYNTH "--windows 00000000000000000000009", 2, "must be whole numbers, 5 to 33"},
+        {SYNTH "--windows 17,15,13,11,9", 2, "--windows 17,15,13,11,9: at most 4 numbers"},
+        {SYNTH "--levels 11", 2, "--levels 11: must be a whole number, 0 to 10"},
+        {SYNTH "--form soft", 2, "--form soft: must be discrete or mean"},
+        {SYNTH "--fixed good.png", 3, "good.png: has no alpha: transparent pixels are those to be made"},
+        {SYNTH "--fixed missing.png", 3, "missing.png: "},
+        {SYNTH "--fixed wide.png", 3, "wide.png: is 24 x 16 pixels, the result 32 x 32: they need one size"},
+        {"synth small.png outputs/a.png --fixed hole.png", 3, "hole.png:colour: has 3 channels, the exemplar's map 1"},
+        {"synth builtin:chocolate?size=32 outputs/a.png --fixed hole.png", 3,
+         "hole.png: has no height, which the exemplar has: give one EXR with all its maps"},
+        {SYNTH "--target missing.png", 3, "missing.png: "},
+        {SYNTH "--target nan.exr", 3, "nan.exr:pixel (8, 16), channel R: is NaN"},
+        {"synth good.png outputs/a.png --size 16x16 --target height.exr", 3,
+         "height.exr: has no colour, which the exemplar has"},
+        {SYNTH "--target wide.png", 3, "wide.png: is 24 x 16 pixels, the result 32 x 32"},
+        {SYNTH "--target guide.png@", 2, "--target guide.png@: must be IMAGE or IMAGE@W"},
+        {SYNTH "--target @3", 2, "--target @3: must be IMAGE or IMAGE@W"},
+        {SYNTH "--target guide.png@-1", 2, "--target guide.png@-1: the weight must be 0 to 1e+06, or an image"},
+        {SYNTH "--target guide.png@missing.png", 3, "missing.png: "},
+        {SYNTH "--target guide.png@good.png", 3, "good.png:pixel (8, 16): is no grey: one number a pixel is needed"},
+        {"synth good.png outputs/a.png --target guide.png --scale-map wide.png", 3,
+         "wide.png: is 24 x 16 pixels, guide.png 32 x 32: they need one size"},
+        {"synth builtin:chocolate?size=32 outputs/a.png --target good.png", 3,
+         "good.png: has no height, which the exemplar has: give one EXR with all its maps, or --map-weight height=0"},
+        {SYNTH "--guide guide.png", 2, "--guide guide.png: the exemplar has no such map"},
+        {SYNTH "--map guide=guide.png", 2, "the exemplar has a map named guide: say with --guide IMAGE"},
+        {SYNTH "--map guide=guide.png --guide good.png", 3,
+         "good.png: has 3 channels, the exemplar's map guide 1: they are compared"},
+        {SYNTH "--map guide=guide.png --guide wide.png", 3, "wide.png: is 24 x 16 pixels"},
+        {SYNTH "--map guide=small.png --guide guide.png", 3, "small.png:guide: this map is 16 x 16 pixels"},
+        {SYNTH "--orientation-map good.png", 3, "good.png:pixel (8, 16): is no grey"},
+        {SYNTH "--orientation-map wide.png", 3, "wide.png: is 24 x 16 pixels"},
+        {SYNTH "--scale-map scale.exr", 3, "scale.exr:pixel (8, 16): a scale of "},
+        {SYNTH "--map-weight colour=0", 3, "good.png: nothing to compare: all maps of the exemplar have weight 0"},
+    };
+    CHECK(cases);
+}
+
+static void a_still_too_large_for_the_machine_is_refused_at_once(void **state)
+{
+    (void)state;
+    double there = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    if (there > 64e9)
+    {
+        print_message("skipped: this machine has memory for 32768 x 32768 pixels\n");
+        skip();
+    }
+    static const Case cases[] = {
+        {"synth good.png outputs/a.png --size 32768x32768", 1, "32768 x 32768 pixels need about "},
     };
     CHECK(cases);
 }
@@ -518,6 +612,8 @@ static void a_full_disk_fails_the_run_and_leaves_no_half_file(void **state)
         {"convert builtin:vortex outputs/a.npy -q", 1, "outputs/a.npy: cannot be written: "},
         {"convert builtin:vortex outputs/a.exr -q", 1, "outputs/a.exr: cannot be written: "},
         {"render builtin:vortex outputs/a.png --as lic --frames 1 -q", 1, "outputs/a.png: cannot be written: "},
+        {"synth builtin:noise outputs/a.png -q", 1, "outputs/a.png: cannot be written: "},
+        {"synth builtin:noise?size=64 outputs/a.exr -q", 1, "outputs/a.exr: cannot be written: "},
         {"measure builtin:noise --report outputs/a.html -q", 1, "outputs/a.html: cannot be written: "},
         {"measure builtin:noise --report outputs/a.json -q", 1, "outputs/a.json: cannot be written: "},
     };
@@ -532,6 +628,8 @@ int main(void)
         cmocka_unit_test(unusable_exemplars_are_refused_with_what_to_do),
         cmocka_unit_test(broken_flows_are_told_by_name_and_place),
         cmocka_unit_test(wrong_command_lines_are_refused_with_the_right_one),
+        cmocka_unit_test(what_a_still_cannot_be_made_of_is_refused_with_the_reason),
+        cmocka_unit_test(a_still_too_large_for_the_machine_is_refused_at_once),
         cmocka_unit_test(frames_that_cannot_be_judged_are_refused_with_the_reason),
         cmocka_unit_test(outputs_that_cannot_be_are_refused_before_anything_is_made),
         cmocka_unit_test(a_full_disk_fails_the_run_and_leaves_no_half_file),

@@ -102,6 +102,42 @@ static void an_option_may_lie_on_the_ends_of_its_range_and_not_beyond(void **sta
 #endif
 }
 
+typedef struct Sides
+{
+    uint32_t struct_size;
+    int sides[RF_MAX_OPTION_INTS];
+} Sides;
+
+static const RfOption g_sides[] = {
+    {"sides", RF_OPTION_INTS, offsetof(Sides, sides), "", 5, 33, 17, "17,9", "A 0 ends them."}};
+
+static RfResult check_sides(Sides sides)
+{
+    return rf_options_check(&sides, sizeof sides, sizeof sides, "defaults", g_sides, 1);
+}
+
+static uint64_t hash_sides(Sides sides)
+{
+    return rf_options_hash(&sides, g_sides, 1, 1);
+}
+
+static void each_number_of_a_list_is_held_to_its_range_and_nothing_behind_its_end(void **state)
+{
+    (void)state;
+    assert_int_equal(check_sides((Sides){0, {33}}), RF_OK);
+    assert_int_equal(check_sides((Sides){0, {5, 6, 7, 33}}), RF_OK);
+    assert_int_equal(check_sides((Sides){0, {17, 9, 0, 1000}}), RF_OK);
+#ifndef RF_STOP_ON_MISUSE
+    assert_int_equal(check_sides((Sides){0, {0, 9}}), RF_INVALID_ARGUMENT);
+    assert_int_equal(check_sides((Sides){0, {17, 4}}), RF_INVALID_ARGUMENT);
+    assert_int_equal(check_sides((Sides){0, {17, 9, 5, 34}}), RF_INVALID_ARGUMENT);
+    assert_int_equal(check_sides((Sides){0, {-17}}), RF_INVALID_ARGUMENT);
+#endif
+    assert_true(hash_sides((Sides){0, {17, 9, 0, 5}}) == hash_sides((Sides){0, {17, 9, 0, 7}}));
+    assert_true(hash_sides((Sides){0, {17, 9, 0, 0}}) != hash_sides((Sides){0, {17, 9, 5, 0}}));
+    assert_true(hash_sides((Sides){0, {17, 9, 0, 0}}) != hash_sides((Sides){0, {9, 17, 0, 0}}));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -109,6 +145,7 @@ int main(void)
         cmocka_unit_test(an_arena_learns_its_peak),
         cmocka_unit_test(every_item_runs_once_for_any_number_of_threads),
         cmocka_unit_test(random_numbers_are_uniform_and_independent_of_order),
+        cmocka_unit_test(each_number_of_a_list_is_held_to_its_range_and_nothing_behind_its_end),
         cmocka_unit_test(an_option_may_lie_on_the_ends_of_its_range_and_not_beyond),
     };
     return cmocka_run_group_tests_name("core", tests, NULL, NULL);

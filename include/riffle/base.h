@@ -105,8 +105,16 @@ typedef enum RfOptionKind
     RF_OPTION_UINT64,
     RF_OPTION_BOOL,
     /// An int whose values are named by `choices`.
-    RF_OPTION_CHOICE
+    RF_OPTION_CHOICE,
+    /// An array of RF_MAX_OPTION_INTS ints, of which the first one is given; a 0 ends it where it is shorter.
+    RF_OPTION_INTS
 } RfOptionKind;
+
+enum
+{
+    /// Entries of an RF_OPTION_INTS.
+    RF_MAX_OPTION_INTS = 4
+};
 
 /// One field of an options struct, so that command lines, help texts and bindings need not repeat it.
 typedef struct RfOption
@@ -118,8 +126,10 @@ typedef struct RfOption
     size_t offset;
     /// "px", "s", "" for plain numbers.
     const char *unit;
+    /// Of RF_OPTION_INTS each entry is held to minimum and maximum, and default_value is its first one.
     double minimum, maximum, default_value;
-    /// "plain|contrast|histogram" for RF_OPTION_CHOICE, else NULL. The n-th name stands for the value n, from 0.
+    /// "plain|contrast|histogram" for RF_OPTION_CHOICE: the n-th name stands for the value n, from 0. "17,9", the
+    /// default, for RF_OPTION_INTS. Else NULL.
     const char *choices;
     /// One sentence: meaning, and what turning it does.
     const char *sentence;

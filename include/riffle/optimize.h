@@ -42,7 +42,7 @@ typedef struct RfOptimizeOptions
     uint32_t struct_size;
     /// Same seed and same input: same bytes, with any number of threads. Default 1.
     uint64_t seed;
-    /// Of the pyramid, 1 to 10; 0 picks them by the exemplar's size: as many as leave fewer than 48 pixels on the
+    /// Of the pyramid, 1 to 10; 0 picks them by the exemplar's size: as many as leave fewer than 18 pixels on the
     /// coarsest one's shorter side, 3 at least. Default 0. More keep larger structures together.
     int levels;
     /// Sides of the windows, odd, 5 to 33 pixels, used one after the other on every level; 0 ends them. Default 17, 9.
@@ -93,3 +93,27 @@ RF_API int rf_optimize_channels(const RfExemplar *exemplar);
 /// exemplar's range. On failure `image` holds its old pixels.
 RF_API RF_MUST_USE RfResult rf_optimize_still(const RfExemplar *exemplar, const RfOptimizeOptions *options,
                                               const RfOptimizeConstraints *constraints, const RfImageView *image);
+
+typedef struct RfOptimize RfOptimize;
+
+/// As the functions of the same names of RfLagrangian. The first step makes a still texture; later ones carry it and
+/// mend it where the flow deforms it.
+RF_API RF_MUST_USE RfResult rf_optimize_create(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                                               RfOptimize **out);
+RF_API RF_MUST_USE RfResult rf_optimize_step(RfOptimize *optimize, const RfFlowView *flow, const RfImageView *frame);
+RF_API RF_MUST_USE RfResult rf_optimize_advance(RfOptimize *optimize, const RfFlowView *flow, int width, int height);
+
+/// What the last step did. Times are seconds of this step.
+typedef struct RfOptimizeStats
+{
+    int windows;
+    /// The rms difference of windows to their matches, in parts of the exemplar's range.
+    double energy;
+    double carry_seconds, search_seconds, draw_seconds;
+} RfOptimizeStats;
+
+RF_API RfOptimizeStats rf_optimize_stats(const RfOptimize *optimize);
+RF_API RF_MUST_USE RfResult rf_optimize_save(const RfOptimize *optimize, void **block, size_t *size);
+RF_API RF_MUST_USE RfResult rf_optimize_load(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                                             const void *block, size_t size, RfOptimize **out);
+RF_API void rf_optimize_destroy(RfOptimize *optimize);

@@ -11,6 +11,7 @@
 // copies of the parent's other threads' locks; it touches none but malloc's, which the C library keeps usable.
 #include "in/child.h"
 
+#include "core/clock.h"
 #include "core/memory.h"
 #include "core/progress.h"
 #include "core/result.h"
@@ -25,7 +26,6 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 enum
@@ -132,13 +132,6 @@ _Noreturn static void run_child(RfChildReadFn *read, const RfFlowSource *source,
 
 // ---- the parent --------------------------------------------------------------------------------------------------
 
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /// What the parent waits for, and why it no longer does.
 typedef struct Wait
 {
@@ -153,7 +146,7 @@ static bool read_all(Wait *wait, void *data, size_t size)
     uint8_t *p = data;
     while (size > 0)
     {
-        double left = wait->deadline - now_seconds();
+        double left = wait->deadline - rf_seconds();
         wait->cancelled = rf_progress("reading the flow", 0) != RF_OK;
         if (wait->cancelled)
             return false;
@@ -227,10 +220,10 @@ RfResult rf_child_read(RfChildReadFn *read, const char *library, const RfFlowSou
         close(ends[0]);
         return rf_fail(RF_UNREADABLE, source->path, NULL, "no process for the reader: %s", strerror(errno));
     }
-    Wait wait = {.pipe = ends[0], .deadline = now_seconds() + WALL_SECONDS};
+    Wait wait = {.pipe = ends[0], .deadline = rf_seconds() + WALL_SECONDS};
     RfResult result = receive(source, &wait, out);
     close(ends[0]);
-    bool late = !wait.complete && now_seconds() >= wait.deadline;
+    bool late = !wait.complete && rf_seconds() >= wait.deadline;
     if (late || wait.cancelled)
         kill(child, SIGKILL);
     int status = 0;

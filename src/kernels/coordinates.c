@@ -21,6 +21,7 @@
 #include "core/result.h"
 #include "core/simd.h"
 #include "kernels/cubic_spline.h"
+#include "kernels/tracing.h"
 
 #include <string.h>
 
@@ -29,8 +30,6 @@ enum
     BAND = 8
 };
 
-// Longest stretch of a path, in flow cells, that one midpoint step traces.
-static const float PATH_STEP = 4.0f;
 // Offsets in pixels stay under it, so that absurd speeds cannot make them infinite.
 static const float FARTHEST = 1e6f;
 
@@ -44,43 +43,6 @@ typedef struct Carry
     int path_steps;
 } Carry;
 
-static float max_speed(const float *velocity, size_t cells)
-{
-    float square = 0;
-    for (size_t k = 0; k < cells; ++k)
-    {
-        float s = velocity[2 * k] * velocity[2 * k] + velocity[2 * k + 1] * velocity[2 * k + 1];
-        square = s > square ? s : square;
-    }
-    return sqrtf(square);
-}
-
-static int path_steps(const RfFlowView *flow, double dt)
-{
-    size_t cells = (size_t)flow->width * (size_t)flow->height;
-    float speed = max_speed(flow->velocity, cells);
-    if (flow->next_velocity)
-        speed = fmaxf(speed, max_speed(flow->next_velocity, cells));
-    // At least a step a frame, since the velocity may change from frame to frame.
-    double steps = ceil(fmax(dt * (double)speed / (double)PATH_STEP, dt));
-    return steps > 256 ? 256 : steps > 1 ? (int)steps : 1;
-}
-
-// Where the point was at the last step, in flow cells.
-static RfVec2 trace_back(const Carry *carry, RfVec2 p)
-{
-    double dt = (carry->flow->time - carry->from) / carry->path_steps, time = carry->flow->time;
-    for (int i = 0; i < carry->path_steps; ++i, time -= dt)
-    {
-        RfVec2 v = rf_flow_sample(carry->flow, p.x, p.y, rf_flow_blend(carry->flow, time));
-        float half = 0.5f * (float)dt;
-        v = rf_flow_sample(carry->flow, p.x - half * v.x, p.y - half * v.y,
-                           rf_flow_blend(carry->flow, time - 0.5 * dt));
-        p = (RfVec2){p.x - (float)dt * v.x, p.y - (float)dt * v.y};
-    }
-    return p;
-}
-
 static void carry_band(void *context, int item, int worker)
 {
     (void)worker;
@@ -91,7 +53,7 @@ static void carry_band(void *context, int item, int worker)
         for (int x = 0; x < c->width; ++x)
         {
             RfVec2 here = {((float)x + 0.5f) * carry->scale_x, ((float)y + 0.5f) * carry->scale_y};
-            RfVec2 there = trace_back(carry, here);
+            RfVec2 there = rf_trace(carry->flow, here, carry->flow->time, carry->from, carry->path_steps);
             float moved[2] = {(there.x - here.x) / carry->scale_x, (there.y - here.y) / carry->scale_y};
             float old[2 * RF_MAX_COORDINATE_SETS];
             rf_spline_sample(c->offset, c->width, c->height, numbers, numbers, (float)x + moved[0], (float)y + moved[1],
@@ -156,7 +118,7 @@ static void carry_offsets(RfCoordinates *c, const RfFlowView *flow)
                    .scale_x = (float)flow->width / (float)c->width,
                    .scale_y = (float)flow->height / (float)c->height,
                    .from = c->time,
-                   .path_steps = path_steps(flow, flow->time - c->time)};
+                   .path_steps = rf_path_steps(flow, flow->time - c->time)};
     rf_spline_prefilter(c->offset, c->width, c->height, 2 * c->sets);
     rf_parallel_for((c->height + BAND - 1) / BAND, carry_band, &carry);
     float *swap = c->offset;

@@ -112,8 +112,15 @@ typedef struct RfSynthesisSearch
     uint64_t seed, round;
 } RfSynthesisSearch;
 
-/// Gives every window its match. *energy: the mean cost, in fixed-point units.
-RfResult rf_synthesis_search(const RfSynthesisSearch *search, double *energy);
+/// Mean costs, in fixed-point units.
+typedef struct RfSynthesisEnergy
+{
+    /// Of all windows, and of those that were compared.
+    double mean, compared;
+} RfSynthesisEnergy;
+
+/// Gives every window its match.
+RfResult rf_synthesis_search(const RfSynthesisSearch *search, RfSynthesisEnergy *energy);
 
 typedef struct RfSynthesisAssign
 {
@@ -122,6 +129,9 @@ typedef struct RfSynthesisAssign
     int side;
     /// A pixel becomes the mean of what its windows say, not one of them.
     bool mean;
+    /// A pixel becomes what most windows say, not what is nearest to their mean: no detail is lost where windows are at
+    /// odds about where it lies.
+    bool strongest;
     /// Windows that fit badly count less (energy with r = 0.8; else r = 2).
     bool robust;
     /// Offsets that differ by up to this, in exemplar pixels, are one: their mean is taken. 0 for still pictures.

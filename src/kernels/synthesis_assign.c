@@ -176,6 +176,15 @@ static void mean_of_votes(const Assigning *a, Ballot *b, int x, int y, float tot
         mean[c] = (mean[c] + hold * held[c]) / (1 + hold);
 }
 
+static int strongest_group(const Ballot *b)
+{
+    int best = -1;
+    for (int g = 0; g < b->groups; ++g)
+        if (b->weight[g] > 0 && (best < 0 || b->weight[g] > b->weight[best]))
+            best = g;
+    return best;
+}
+
 static int nearest_group(const Assigning *a, const Ballot *b, const float *mean)
 {
     float least = INFINITY;
@@ -221,7 +230,7 @@ static bool assign_pixel(const Assigning *a, Ballot *b, int x, int y)
     float mean[RF_MAX_EXEMPLAR_CHANNELS];
     mean_of_votes(a, b, x, y, total, mean);
     int16_t *pixel = rf_fixed_at(&assign->frame->picture, x, y);
-    int best = nearest_group(a, b, mean);
+    int best = assign->strongest ? strongest_group(b) : nearest_group(a, b, mean);
     bool other =
         set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], snap(a, place_of(b, best)));
     for (int c = 0; c < a->channels && (assign->mean || assign->held); ++c)
@@ -240,16 +249,41 @@ static bool assign_pixel(const Assigning *a, Ballot *b, int x, int y)
     return other;
 }
 
+// Where the middle of a cell comes from, if all windows over it say much the same: their mean, and the mean turn.
+static RfVec2 agreed_place(const Assigning *a, const Ballot *b, RfVec2 middle, RfVec2 *turn)
+{
+    if (a->assign->together == 0)
+    {
+        *turn = (RfVec2){1, 0};
+        return rf_vec2_add(b->vote[0].source, rf_vec2_sub(middle, b->vote[0].at));
+    }
+    RfVec2 place = {0, 0}, turns = {0, 0};
+    float total = 1e-30f;
+    for (int i = 0; i < b->votes; ++i)
+    {
+        const Vote *vote = &b->vote[i];
+        float weight = weigh(a, vote, middle.x, middle.y);
+        RfVec2 said = rf_vec2_add(vote->source, rf_turn(vote->turn, rf_vec2_sub(middle, vote->at)));
+        place = (RfVec2){place.x + weight * said.x, place.y + weight * said.y};
+        turns = (RfVec2){turns.x + weight * vote->turn.x, turns.y + weight * vote->turn.y};
+        total += weight;
+    }
+    *turn = (RfVec2){turns.x / total, turns.y / total};
+    return (RfVec2){place.x / total, place.y / total};
+}
+
 // All windows say the same, and nothing else is asked for: the cell is a piece of the exemplar.
 static bool copy_cell(const Assigning *a, const Ballot *b, int x0, int y0, int x1, int y1)
 {
     const RfSynthesisAssign *assign = a->assign;
     bool other = false;
-    RfVec2 offset = rf_vec2_sub(b->vote[0].source, b->vote[0].at);
+    RfVec2 middle = {0.5f * (float)(x0 + x1 - 1), 0.5f * (float)(y0 + y1 - 1)}, turn;
+    RfVec2 agreed = agreed_place(a, b, middle, &turn);
     for (int y = y0; y < y1; ++y)
         for (int x = x0; x < x1; ++x)
         {
-            RfVec2 place = rf_vec2_add(offset, (RfVec2){(float)x, (float)y});
+            RfVec2 step = {(float)x - middle.x, (float)y - middle.y};
+            RfVec2 place = rf_vec2_add(agreed, rf_turn(turn, step));
             if (!source_inside(assign->exemplar, place))
                 continue;
             other |= set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], place);
@@ -284,15 +318,15 @@ static void assign_row(void *context, int row, int worker)
         if (assign->all || has_changed(a, i, row))
         {
             hear(a, i, row, b);
-            bool plain = b->groups == 1 && assign->together == 0 && !assign->held;
-            if (plain)
+            if (b->groups == 1 && !assign->held && !assign->mean)
                 other = copy_cell(a, b, x0, y0, x1, y1);
             else
                 for (int y = y0; y < y1; ++y)
                     for (int x = x0; x < x1; ++x)
                         other |= assign_pixel(a, b, x, y);
         }
-        f->stirred[(ptrdiff_t)row * f->columns + i] = other;
+        // A carried pixel is always another; what matters there is whether its windows are at odds.
+        f->stirred[(ptrdiff_t)row * f->columns + i] = assign->carried ? b->groups > 1 : other;
     }
 }
 
@@ -307,7 +341,7 @@ RfResult rf_synthesis_assign(const RfSynthesisAssign *assign)
     {
         a->assign = assign;
         a->ballots = ballots;
-        a->reach = (half + f->spacing - 1) / f->spacing + assign->carried;
+        a->reach = (half + f->spacing - 1) / f->spacing;
         a->half = (float)half + 0.5f;
         a->channels = assign->exemplar->channels - assign->guides;
         a->smallest_cost = (float)numbers * LEAST_DIFFERENCE * LEAST_DIFFERENCE;

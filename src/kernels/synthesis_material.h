@@ -20,17 +20,19 @@ typedef struct RfSynthesisMaterial
     /// once, with their weights' sum.
     int from[RF_MAX_EXEMPLAR_CHANNELS];
     float middle[RF_MAX_EXEMPLAR_CHANNELS], factor[RF_MAX_EXEMPLAR_CHANNELS];
-    /// 0 is the finest.
+    /// For each channel of the exemplar: 1 + the compared channel that equals it, 0 if there is none.
+    int compared[RF_MAX_EXEMPLAR_CHANNELS];
     /// The widest range of a compared channel, in the unit of comparison.
     float widest;
     int level_count;
+    /// 0 is the finest.
     RfSynthesisExemplar levels[RF_SYNTHESIS_LEVELS];
 } RfSynthesisMaterial;
 
 /// The map of this name is compared with a guide, and not made.
 #define RF_GUIDE_MAP "guide"
 
-/// levels: 0 picks as many as leave 24 to 47 pixels on the shorter side, but 3 at least where there is room. Exemplar
+/// levels: 0 picks as many as leave 9 to 17 pixels on the shorter side, but 3 at least where there is room. Exemplar
 /// borrowed.
 RfResult rf_synthesis_material_create(const RfExemplar *exemplar, int levels, int similar, RfSynthesisMaterial *out);
 void rf_synthesis_material_free(RfSynthesisMaterial *material);

@@ -53,7 +53,8 @@ typedef struct Walk
     int half;
     int asked[ASKED];
     Scratch *scratch;
-    double *energy;
+    /// Sums over each row: of all costs, of those compared, and how many these are.
+    double (*sums)[3];
     /// Of the windows that are searched exactly.
     int first;
     const int *list;
@@ -242,7 +243,7 @@ static void search_row(void *context, int row, int worker)
     const Walk *walk = context;
     RfSynthesisFrame *f = walk->search->frame;
     int reach = (walk->half + f->spacing - 1) / f->spacing;
-    double energy = 0;
+    double *sums = walk->sums[row];
     for (int i = 0; i < f->columns; ++i)
     {
         RfSynthesisWindow *window = &f->windows[(ptrdiff_t)row * f->columns + i];
@@ -250,10 +251,13 @@ static void search_row(void *context, int row, int worker)
             continue;
         window->changed = false;
         if (walk->search->all || is_stirred(f, i, row, reach))
+        {
             search_window(walk, window, row * f->columns + i, &walk->scratch[worker]);
-        energy += (double)window->cost;
+            sums[1] += (double)window->cost;
+            sums[2] += 1;
+        }
+        sums[0] += (double)window->cost;
     }
-    walk->energy[row] = energy;
 }
 
 // ---- the exact search
@@ -299,7 +303,9 @@ static RfResult search_batch(Walk *walk, int count, const float *penalties, RfWi
         RfSynthesisWindow *window = &walk->search->frame->windows[walk->list[walk->first + i]];
         RfVec2 place = {(float)(matches[i].place.x + walk->half), (float)(matches[i].place.y + walk->half)};
         settle(window, compared_at(walk, window), place, matches[i].distance * unit);
-        walk->energy[0] += (double)window->cost;
+        walk->sums[0][0] += (double)window->cost;
+        walk->sums[0][1] += (double)window->cost;
+        walk->sums[0][2] += 1;
     }
     return RF_OK;
 }
@@ -345,7 +351,7 @@ static int count_windows(const RfSynthesisFrame *f)
     return count;
 }
 
-RfResult rf_synthesis_search(const RfSynthesisSearch *search, double *energy)
+RfResult rf_synthesis_search(const RfSynthesisSearch *search, RfSynthesisEnergy *energy)
 {
     RfSynthesisFrame *f = search->frame;
     assert(search->side <= RF_FIXED_SIDE && search->side % 2 == 1);
@@ -356,17 +362,18 @@ RfResult rf_synthesis_search(const RfSynthesisSearch *search, double *energy)
     for (int i = 0; i < ASKED; ++i)
         walk.asked[i] = (int)lrint((double)walk.half * (2 * i - (ASKED - 1)) / (ASKED - 1));
     walk.scratch = rf_allocate_zero((size_t)rf_threads(), sizeof *walk.scratch);
-    walk.energy = rf_allocate_zero((size_t)f->rows, sizeof *walk.energy);
-    RfResult result = walk.scratch && walk.energy ? RF_OK : RF_OUT_OF_MEMORY;
+    walk.sums = rf_allocate_zero((size_t)f->rows, sizeof *walk.sums);
+    RfResult result = walk.scratch && walk.sums ? RF_OK : RF_OUT_OF_MEMORY;
     if (result == RF_OK && search->windows)
         result = search_exactly(&walk);
     else if (result == RF_OK)
         rf_parallel_for(f->rows, search_row, &walk);
-    double sum = 0;
+    double sums[3] = {0};
     for (int j = 0; j < f->rows && result == RF_OK; ++j)
-        sum += walk.energy[j];
-    *energy = sum / rf_max_int(count_windows(f), 1);
+        for (int k = 0; k < 3; ++k)
+            sums[k] += walk.sums[j][k];
+    *energy = (RfSynthesisEnergy){sums[0] / rf_max_int(count_windows(f), 1), sums[2] > 0 ? sums[1] / sums[2] : 0};
     rf_release(walk.scratch);
-    rf_release(walk.energy);
+    rf_release(walk.sums);
     return result;
 }

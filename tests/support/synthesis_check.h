@@ -75,9 +75,9 @@ static inline RfWindowDatabase *all_windows(const RfSynthesisExemplar *e, int si
 
 static inline double search_with(RfSynthesisSearch search)
 {
-    double energy = -1;
+    RfSynthesisEnergy energy = {-1, -1};
     assert_int_equal(rf_synthesis_search(&search, &energy), RF_OK);
-    return energy;
+    return energy.mean;
 }
 
 static inline void assign_with(RfSynthesisAssign assign)

@@ -10,6 +10,7 @@
 
 #include "methods/lagrangian/lagrangian.h"
 
+#include "core/clock.h"
 #include "core/maths.h"
 #include "core/options.h"
 #include "core/progress.h"
@@ -17,7 +18,6 @@
 #include "data/flow_field.h"
 
 #include <string.h>
-#include <time.h>
 
 // An exemplar that does not tile must measure 1.5 grids, so that there are areas to choose from.
 #define LEAST_EXEMPLAR (1.5f * GRID_SIDE)
@@ -153,13 +153,6 @@ void rf_lagrangian_destroy(RfLagrangian *l)
     rf_release(l);
 }
 
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static RfResult check_step(const RfLagrangian *l, const RfFlowView *flow, int width, int height)
 {
     RF_TRY(rf_flow_view_check(flow));
@@ -192,9 +185,9 @@ static RfResult move_to(RfLagrangian *l, const RfFlowView *view, int width, int 
     for (int i = 0; i < RF_MAX_THREADS; ++i)
         rf_arena_reset(&l->workers[i]);
 
-    double start = now();
+    double start = rf_seconds();
     rf_lagrangian_grids_advect(l, flow);
-    double advected = now();
+    double advected = rf_seconds();
     RF_TRY(rf_lagrangian_grids_retire(l, flow));
     rf_lagrangian_grids_drop(l);
     RfResult refilled = rf_lagrangian_grids_refill(l, flow);
@@ -206,7 +199,7 @@ static RfResult move_to(RfLagrangian *l, const RfFlowView *view, int width, int 
         return refilled;
     }
     l->stats.advect_seconds = advected - start;
-    l->stats.distribute_seconds = now() - advected;
+    l->stats.distribute_seconds = rf_seconds() - advected;
     count_grids(l);
     l->started = true;
     ++l->step;
@@ -233,9 +226,9 @@ RfResult rf_lagrangian_step(RfLagrangian *l, const RfFlowView *flow, const RfIma
     RF_TRY(rf_progress("advecting", 0));
     StepFlow step;
     RF_TRY(move_to(l, flow, frame->width, frame->height, &step));
-    double start = now();
+    double start = rf_seconds();
     RF_TRY(rf_lagrangian_frame_draw(l, &step, frame));
-    l->stats.draw_seconds = now() - start;
+    l->stats.draw_seconds = rf_seconds() - start;
     return RF_OK;
 }
 

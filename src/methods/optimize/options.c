@@ -8,6 +8,8 @@ static const RfOption g_options[] = {
      "Where the first windows start in the exemplar is drawn from it."},
     {"levels", RF_OPTION_INT, offsetof(RfOptimizeOptions, levels), "", 0, RF_SYNTHESIS_LEVELS, 0, NULL,
      "Levels of the pyramid; 0 picks them by the exemplar's size. More keep larger structures together."},
+    {"windows", RF_OPTION_INTS, offsetof(RfOptimizeOptions, windows), "px", 5, RF_FIXED_SIDE, 17, "17,9",
+     "Sides of the windows, odd, used one after the other on every level; large ones keep large structures together."},
     {"iterations", RF_OPTION_INT, offsetof(RfOptimizeOptions, iterations), "", 1, 100, 4, NULL,
      "Search and assign steps with each window on the coarsest level; half as many on each finer one."},
     {"form", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, form), "", 0, 1, RF_FORM_DISCRETE, "discrete|mean",
@@ -23,6 +25,8 @@ static const RfOption g_options[] = {
     {"tile", RF_OPTION_BOOL, offsetof(RfOptimizeOptions, tile), "", 0, 1, 0, NULL,
      "The result continues across its own borders."},
 };
+
+static_assert((int)RF_MAX_OPTIMIZE_WINDOWS == (int)RF_MAX_OPTION_INTS, "windows are an RF_OPTION_INTS");
 
 enum
 {
@@ -51,9 +55,7 @@ RfResult rf_optimize_check(const RfOptimizeOptions *options)
 {
     RF_TRY(rf_options_check(options, options->struct_size, sizeof *options, "rf_optimize_defaults", g_options,
                             OPTION_COUNT));
-    RF_REQUIRE(options->windows[0], "windows: at least one is needed");
     for (int i = 0; i < RF_MAX_OPTIMIZE_WINDOWS && options->windows[i]; ++i)
-        RF_REQUIRE(options->windows[i] >= 5 && options->windows[i] <= RF_FIXED_SIDE && options->windows[i] % 2 == 1,
-                   "windows: %d must be odd, 5 to %d", options->windows[i], RF_FIXED_SIDE);
+        RF_REQUIRE(options->windows[i] % 2 == 1, "windows %d: must be odd", options->windows[i]);
     return RF_OK;
 }

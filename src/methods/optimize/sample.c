@@ -18,7 +18,8 @@ static int index_of(const RfExemplar *e, int i, int n)
     return e->tiles ? rf_wrap_int(i, n) : rf_clamp_int(i, 0, n - 1);
 }
 
-static void sample_all(const RfExemplar *e, RfVec2 source, float *values)
+// False: the pixels of the exemplar as they are.
+static bool sample_all(const RfExemplar *e, RfVec2 source, float *values)
 {
     int x = (int)floorf(source.x), y = (int)floorf(source.y);
     float u = source.x - (float)x, v = source.y - (float)y, wx[4], wy[4];
@@ -27,7 +28,7 @@ static void sample_all(const RfExemplar *e, RfVec2 source, float *values)
         const float *pixel =
             e->pixels + ((ptrdiff_t)index_of(e, y, e->height) * e->width + index_of(e, x, e->width)) * e->channels;
         memcpy(values, pixel, (size_t)e->channels * sizeof *values);
-        return;
+        return false;
     }
     cubic_weights(u, wx);
     cubic_weights(v, wy);
@@ -40,6 +41,17 @@ static void sample_all(const RfExemplar *e, RfVec2 source, float *values)
                                                  e->channels;
             for (int c = 0; c < e->channels; ++c)
                 values[c] += wy[j] * wx[i] * pixel[c];
+        }
+    return true;
+}
+
+static void take_mean(const RfSynthesisMaterial *m, const int16_t *mean, float *values)
+{
+    for (int c = 0; c < m->exemplar->channels; ++c)
+        if (m->compared[c])
+        {
+            int k = m->compared[c] - 1;
+            values[c] = (float)mean[k] / (m->levels[0].scale * m->factor[k]) + m->middle[k];
         }
 }
 
@@ -82,11 +94,14 @@ int rf_optimize_channels(const RfExemplar *exemplar)
     return channels;
 }
 
-void rf_optimize_sample(const RfSynthesisMaterial *material, RfVec2 source, const RfVec2 *turn, float *values)
+void rf_optimize_sample(const RfSynthesisMaterial *material, RfVec2 source, const RfVec2 *turn, const int16_t *mean,
+                        float *values)
 {
     const RfExemplar *e = material->exemplar;
     float all[RF_MAX_EXEMPLAR_CHANNELS];
-    sample_all(e, source, all);
+    bool between = sample_all(e, source, all);
+    if (mean)
+        take_mean(material, mean, all);
     for (int i = 0; i < e->map_count; ++i)
     {
         const RfMapView *map = &e->maps[i];
@@ -95,7 +110,8 @@ void rf_optimize_sample(const RfSynthesisMaterial *material, RfVec2 source, cons
         float *part = all + e->first_channel[i];
         if (turn)
             turn_map(map, *turn, part);
-        clamp_map(map, part);
+        if (between)
+            clamp_map(map, part);
         memcpy(values, part, (size_t)map->image.channels * sizeof *values);
         values += map->image.channels;
     }

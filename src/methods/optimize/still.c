@@ -23,10 +23,17 @@
 #include <stdio.h>
 #include <string.h>
 
+enum
+{
+    LEAST_SIDE = 8
+};
+
 // Strong enough to leave nothing of a fixed pixel to its windows, in 16-bit numbers.
 static const float FIXED_HOLD = 1e6f;
 // Places within this of each other, in exemplar pixels, are one where windows are turned or scaled.
 static const float TURNED_TOGETHER = 0.75f;
+// Of four turns of one length, so much of it must be left of their mean for it to be a direction.
+static const float LEAST_AGREEMENT = 0.05f;
 
 /// What the constraints say on one level.
 typedef struct Bounds
@@ -54,7 +61,8 @@ typedef struct Still
     RfWindowDatabase *windows;
     float *prices;
     float first_energy;
-    int done, steps;
+    /// In pixels searched.
+    double done, steps;
 } Still;
 
 // ---- constraints
@@ -178,6 +186,36 @@ static void halve_target(const Bounds *fine, Bounds *coarse, int channels, bool 
         coarse->target[i] /= rf_max(coarse->hold[i / (size_t)channels], 1e-20f);
 }
 
+// Turns are halved as directions, and lengths apart: the mean of two that point against each other is none.
+static RfResult halve_turns(const Bounds *fine, Bounds *coarse, bool tiles)
+{
+    size_t pixels = (size_t)fine->width * (size_t)fine->height;
+    float *lengths = rf_allocate(pixels, sizeof *lengths);
+    float *halved = rf_allocate((size_t)coarse->width * (size_t)coarse->height, sizeof *halved);
+    coarse->turns = rf_allocate((size_t)coarse->width * (size_t)coarse->height, sizeof *coarse->turns);
+    bool enough = lengths && halved && coarse->turns;
+    for (size_t i = 0; i < pixels && enough; ++i)
+        lengths[i] = rf_vec2_length(fine->turns[i]);
+    if (enough)
+    {
+        rf_halve(lengths, fine->width, fine->height, 1, tiles, halved);
+        rf_halve(&fine->turns->x, fine->width, fine->height, 2, tiles, &coarse->turns->x);
+    }
+    for (int y = 0; y < coarse->height && enough; ++y)
+        for (int x = 0; x < coarse->width; ++x)
+        {
+            size_t i = (size_t)y * (size_t)coarse->width + (size_t)x;
+            RfVec2 turn = coarse->turns[i], own = fine->turns[(size_t)(2 * y) * (size_t)fine->width + (size_t)(2 * x)];
+            if (rf_vec2_length(turn) < LEAST_AGREEMENT * halved[i])
+                turn = own;
+            float factor = halved[i] / rf_vec2_length(turn);
+            coarse->turns[i] = (RfVec2){turn.x * factor, turn.y * factor};
+        }
+    rf_release(lengths);
+    rf_release(halved);
+    return enough ? RF_OK : RF_OUT_OF_MEMORY;
+}
+
 static RfResult halve_bounds(Still *s, int level)
 {
     const Bounds *fine = &s->bounds[level - 1];
@@ -202,14 +240,7 @@ static RfResult halve_bounds(Still *s, int level)
             return RF_OUT_OF_MEMORY;
         rf_halve(fine->guide, fine->width, fine->height, guides, tiles, b->guide);
     }
-    if (fine->turns)
-    {
-        b->turns = rf_allocate(pixels, sizeof *b->turns);
-        if (!b->turns)
-            return RF_OUT_OF_MEMORY;
-        rf_halve(&fine->turns->x, fine->width, fine->height, 2, tiles, &b->turns->x);
-    }
-    return RF_OK;
+    return fine->turns ? halve_turns(fine, b, tiles) : RF_OK;
 }
 
 static RfResult fix_bounds(const Still *s, Bounds *b)
@@ -275,7 +306,7 @@ static bool is_turned(const Still *s)
     return s->bounds[s->level].turns != NULL;
 }
 
-static RfResult search_step(Still *s, int round, bool all, double *energy)
+static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *energy)
 {
     RfSynthesisSearch search = {
         .exemplar = &s->material.levels[s->level],
@@ -324,6 +355,11 @@ static void set_prices(Still *s, double energy)
     rf_usage_prices(&s->usage, e->width, e->height, margin, s->options->spread * s->first_energy, s->prices);
 }
 
+static double pixels_of(const Still *s, int level)
+{
+    return (double)s->bounds[level].width * s->bounds[level].height;
+}
+
 static RfResult tell(Still *s, int iteration, int iterations, double energy)
 {
     char stage[96];
@@ -331,7 +367,8 @@ static RfResult tell(Still *s, int iteration, int iterations, double energy)
     double rms = sqrt(energy / numbers) / (s->material.levels[0].scale * s->material.widest);
     snprintf(stage, sizeof stage, "level %d of %d, windows of %d, iteration %d of %d, energy %.4f",
              s->material.level_count - s->level, s->material.level_count, s->side, iteration + 1, iterations, rms);
-    return rf_progress(stage, (double)++s->done / s->steps);
+    s->done += pixels_of(s, s->level);
+    return rf_progress(stage, s->done / s->steps);
 }
 
 static RfResult run_windows(Still *s, int window, bool start)
@@ -352,12 +389,12 @@ static RfResult run_windows(Still *s, int window, bool start)
     int iterations = iterations_of(s, s->level, window);
     for (int i = 0; i < iterations; ++i)
     {
-        double energy;
+        RfSynthesisEnergy energy;
         RF_TRY(search_step(s, i, i == 0 || s->windows, &energy));
         if (s->options->spread > 0)
-            set_prices(s, energy);
+            set_prices(s, energy.mean);
         RF_TRY(assign_step(s, true, i == 0 || s->windows));
-        RF_TRY(tell(s, i, iterations, energy));
+        RF_TRY(tell(s, i, iterations, energy.mean));
     }
     return RF_OK;
 }
@@ -393,7 +430,7 @@ static void count_steps(Still *s)
 {
     for (int l = 0; l < s->material.level_count; ++l)
         for (int w = 0; w < RF_MAX_OPTIMIZE_WINDOWS && s->options->windows[w]; ++w)
-            s->steps += iterations_of(s, l, w);
+            s->steps += iterations_of(s, l, w) * pixels_of(s, l);
 }
 
 static RfResult run_levels(Still *s)
@@ -436,19 +473,94 @@ static void draw_row(void *context, int y, int worker)
         if (fixed->pixels && view_pixel(fixed, x, y)[fixed->channels - 1] >= 0.5f)
             memcpy(values, view_pixel(fixed, x, y), (size_t)d->image->channels * sizeof *values);
         else
-            rf_optimize_sample(&s->material, s->frame.sources[pixel], b->turns ? &b->turns[pixel] : NULL, values);
+            rf_optimize_sample(&s->material, s->frame.sources[pixel], b->turns ? &b->turns[pixel] : NULL,
+                               s->options->form == RF_FORM_MEAN ? rf_fixed_at(&s->frame.picture, x, y) : NULL, values);
     }
 }
 
-static RfResult make_still(Still *s, const RfExemplar *exemplar, const RfImageView *image)
+static void free_still(Still *s)
+{
+    rf_synthesis_frame_free(&s->frame);
+    rf_windows_destroy(s->windows);
+    rf_release(s->prices);
+    for (int l = 0; l < RF_SYNTHESIS_LEVELS; ++l)
+        free_bounds(&s->bounds[l]);
+    rf_synthesis_material_free(&s->material);
+    rf_release(s);
+}
+
+static RfResult run_still(Still *s, const RfExemplar *exemplar, int width, int height)
 {
     RF_TRY(rf_progress("preparing the exemplar", 0));
     RF_TRY(rf_synthesis_material_create(exemplar, s->options->levels, s->options->similar, &s->material));
-    RF_TRY(make_bounds(s, image->width, image->height));
-    RF_TRY(run_levels(s));
-    Drawing drawing = {s, image};
-    rf_parallel_for(image->height, draw_row, &drawing);
+    RF_TRY(make_bounds(s, width, height));
+    return run_levels(s);
+}
+
+static RfResult make_still(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                           const RfOptimizeConstraints *constraints, int width, int height, Still **out)
+{
+    static const RfOptimizeConstraints none;
+    *out = NULL;
+    Still *s = rf_allocate_zero(1, sizeof *s);
+    if (!s)
+        return RF_OUT_OF_MEMORY;
+    s->options = options;
+    s->constraints = constraints ? constraints : &none;
+    RfResult result = run_still(s, exemplar, width, height);
+    if (result == RF_OK)
+        *out = s;
+    else
+        free_still(s);
+    return result;
+}
+
+RfResult rf_optimize_start(const RfExemplar *exemplar, const RfOptimizeOptions *options,
+                           const RfOptimizeConstraints *constraints, int width, int height, RfOptimizeStart *out)
+{
+    Still *s;
+    RF_TRY(make_still(exemplar, options, constraints, width, height, &s));
+    *out = (RfOptimizeStart){s->material, s->frame, s->usage, s->first_energy, s->side};
+    s->material = (RfSynthesisMaterial){0};
+    s->frame = (RfSynthesisFrame){0};
+    free_still(s);
     return RF_OK;
+}
+
+static RfResult check_view(const char *name, const RfImageView *view, int channels, const RfImageView *image)
+{
+    if (!view->pixels)
+        return RF_OK;
+    RF_REQUIRE(view->width == image->width && view->height == image->height && view->channels == channels,
+               "rf_optimize_still: %s is %d x %d with %d channels, not %d x %d with %d", name, view->width,
+               view->height, view->channels, image->width, image->height, channels);
+    for (int y = 0; y < view->height; ++y)
+        for (int i = 0; i < view->width * channels; ++i)
+            RF_REQUIRE(fabsf(view->pixels[y * view->row_stride + i]) < 1e15f,
+                       "rf_optimize_still: %s has a value that is not finite", name);
+    return RF_OK;
+}
+
+static RfResult check_views(const RfExemplar *exemplar, const RfOptimizeConstraints *k, const RfImageView *image)
+{
+    int made = rf_optimize_channels(exemplar), guides = exemplar->channels - made;
+    RF_REQUIRE(image->channels == made, "rf_optimize_still: the image has %d channels, %d are made", image->channels,
+               made);
+    RF_REQUIRE(image->width >= LEAST_SIDE && image->height >= LEAST_SIDE && image->width <= RF_MAX_SIZE &&
+                   image->height <= RF_MAX_SIZE,
+               "rf_optimize_still: %d x %d pixels: each side must be %d to %d", image->width, image->height, LEAST_SIDE,
+               RF_MAX_SIZE);
+    RF_REQUIRE((guides > 0) == (k->guide.pixels != NULL),
+               "rf_optimize_still: the exemplar's map %s and a guide belong "
+               "together",
+               RF_GUIDE_MAP);
+    RF_REQUIRE(k->target.pixels || !k->target_weight.pixels, "rf_optimize_still: a weight without a target");
+    RF_TRY(check_view("fixed", &k->fixed, made + 1, image));
+    RF_TRY(check_view("target", &k->target, made, image));
+    RF_TRY(check_view("target_weight", &k->target_weight, 1, image));
+    RF_TRY(check_view("guide", &k->guide, guides, image));
+    RF_TRY(check_view("orientation", &k->orientation, 1, image));
+    return check_view("scale", &k->scale, 1, image);
 }
 
 RfResult rf_optimize_still(const RfExemplar *exemplar, const RfOptimizeOptions *options,
@@ -457,18 +569,11 @@ RfResult rf_optimize_still(const RfExemplar *exemplar, const RfOptimizeOptions *
     RF_REQUIRE(exemplar && options && image && image->pixels, "rf_optimize_still: exemplar, options or image is NULL");
     RF_TRY(rf_optimize_check(options));
     static const RfOptimizeConstraints none;
-    Still *s = rf_allocate_zero(1, sizeof *s);
-    if (!s)
-        return RF_OUT_OF_MEMORY;
-    s->options = options;
-    s->constraints = constraints ? constraints : &none;
-    RfResult result = make_still(s, exemplar, image);
-    rf_synthesis_frame_free(&s->frame);
-    rf_windows_destroy(s->windows);
-    rf_release(s->prices);
-    for (int l = 0; l < RF_SYNTHESIS_LEVELS; ++l)
-        free_bounds(&s->bounds[l]);
-    rf_synthesis_material_free(&s->material);
-    rf_release(s);
-    return result;
+    RF_TRY(check_views(exemplar, constraints ? constraints : &none, image));
+    Still *s;
+    RF_TRY(make_still(exemplar, options, constraints, image->width, image->height, &s));
+    Drawing drawing = {s, image};
+    rf_parallel_for(image->height, draw_row, &drawing);
+    free_still(s);
+    return RF_OK;
 }
