@@ -315,6 +315,27 @@ static void a_piece_of_the_exemplar_is_a_fixed_point(void **state)
     }
 }
 
+// The pixels round a window know where they come from: all of them say where its centre should.
+static void a_window_that_has_lost_its_place_is_told_it_by_its_pixels(void **state)
+{
+    (void)state;
+    RfSynthesisExemplar e = make_exemplar(44, 39, CHANNELS, false, 5);
+    RfSynthesisFrame f = make_piece(&e, 36, 36, false, 2, 1, 12);
+    for (int i = 0; i < window_count(&f); ++i)
+    {
+        RfSynthesisWindow *w = &f.windows[i];
+        // Neither the window nor its middle pixel.
+        f.sources[(int)w->at.y * 36 + (int)w->at.x] = w->source = (RfVec2){5, 5};
+    }
+    double energy = search_with(
+        (RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .plain = true, .all = true});
+    assert_true(energy == 0);
+    for (int i = 0; i < window_count(&f); ++i)
+        assert_true(f.windows[i].source.x == f.windows[i].at.x + 2 && f.windows[i].source.y == f.windows[i].at.y + 1);
+    rf_synthesis_frame_free(&f);
+    rf_synthesis_exemplar_free(&e);
+}
+
 // Turned by a quarter, the exemplar lies in the frame so that windows that know of the turn find it.
 static void a_turned_piece_is_found_by_windows_that_are_turned_alike(void **state)
 {
@@ -439,6 +460,7 @@ int main(void)
         cmocka_unit_test(a_search_without_prices_never_makes_a_window_dearer),
         cmocka_unit_test(what_a_window_has_it_keeps_unless_another_is_better_by_the_margin),
         cmocka_unit_test(a_piece_of_the_exemplar_is_a_fixed_point),
+        cmocka_unit_test(a_window_that_has_lost_its_place_is_told_it_by_its_pixels),
         cmocka_unit_test(a_turned_piece_is_found_by_windows_that_are_turned_alike),
         cmocka_unit_test(only_what_is_stirred_is_searched_and_only_what_has_changed_is_made),
         cmocka_unit_test(doubled_places_of_a_piece_are_a_piece),
