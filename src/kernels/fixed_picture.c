@@ -95,13 +95,14 @@ static int64_t distance_plain(const RfFixedQuery *query, const int16_t *candidat
 }
 
 #if defined(__x86_64__)
+// (clang 14 drops a target with an architecture: features are named one by one.)
 enum
 {
     // Between two looks at the limit.
     ROWS_AT_ONCE = 5
 };
 
-__attribute__((target("arch=x86-64-v3"))) static int64_t fold_avx2(__m256i sum)
+__attribute__((target("avx2"))) static int64_t fold_avx2(__m256i sum)
 {
     __m256i wide = _mm256_add_epi64(_mm256_cvtepu32_epi64(_mm256_castsi256_si128(sum)),
                                     _mm256_cvtepu32_epi64(_mm256_extracti128_si256(sum, 1)));
@@ -109,8 +110,8 @@ __attribute__((target("arch=x86-64-v3"))) static int64_t fold_avx2(__m256i sum)
     return _mm_extract_epi64(half, 0) + _mm_extract_epi64(half, 1);
 }
 
-__attribute__((target("arch=x86-64-v3"))) static int64_t distance_avx2(const RfFixedQuery *query,
-                                                                       const int16_t *candidate, int64_t limit)
+__attribute__((target("avx2"))) static int64_t distance_avx2(const RfFixedQuery *query, const int16_t *candidate,
+                                                             int64_t limit)
 {
     __m256i sum = _mm256_setzero_si256();
     for (int y = 0; y < query->side; ++y)
@@ -129,14 +130,14 @@ __attribute__((target("arch=x86-64-v3"))) static int64_t distance_avx2(const RfF
     return fold_avx2(sum);
 }
 
-__attribute__((target("arch=x86-64-v4"))) static int64_t fold_avx512(__m512i sum)
+__attribute__((target("avx512f,avx512bw"))) static int64_t fold_avx512(__m512i sum)
 {
     return _mm512_reduce_add_epi64(_mm512_add_epi64(_mm512_cvtepu32_epi64(_mm512_castsi512_si256(sum)),
                                                     _mm512_cvtepu32_epi64(_mm512_extracti64x4_epi64(sum, 1))));
 }
 
-__attribute__((target("arch=x86-64-v4,prefer-vector-width=512"))) static int64_t
-distance_avx512(const RfFixedQuery *query, const int16_t *candidate, int64_t limit)
+__attribute__((target("avx512f,avx512bw"))) static int64_t distance_avx512(const RfFixedQuery *query,
+                                                                           const int16_t *candidate, int64_t limit)
 {
     __m512i sum = _mm512_setzero_si512();
     for (int y = 0; y < query->side; ++y)
