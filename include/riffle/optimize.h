@@ -42,7 +42,7 @@ typedef struct RfOptimizeOptions
     uint32_t struct_size;
     /// Same seed and same input: same bytes, with any number of threads. Default 1.
     uint64_t seed;
-    /// Of the pyramid, 1 to 10; 0 picks them by the exemplar's size: as many as leave 32 pixels or fewer on the
+    /// Of the pyramid, 1 to 10; 0 picks them by the exemplar's size: as many as leave fewer than 18 pixels on the
     /// coarsest one's shorter side, 3 at least. Default 0. More keep larger structures together.
     int levels;
     /// Sides of the windows, odd, 5 to 33 pixels, used one after the other on every level; 0 ends them. Default 17, 9.
@@ -50,7 +50,7 @@ typedef struct RfOptimizeOptions
     int windows[RF_MAX_OPTIMIZE_WINDOWS];
     /// Search and assign steps with each window on the coarsest level, 1 to 100; half as many on each finer one.
     /// Default
-    /// 4. More lower the energy, little after 4.
+    /// 6. More lower the energy, little after 6.
     int iterations;
     RfOptimizeForm form;
     /// Price of using one place of the exemplar more than others, against the mean cost of a window, 0 to 100. Default
