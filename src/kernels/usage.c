@@ -9,8 +9,8 @@ enum
     N = RF_USAGE_CELLS
 };
 
-// Of the price, where a cell is used twice as much as the mean. Windows answer prices all at once, so larger steps swing:
-// with 0.5 two of eight exemplars crowd into one corner for good; smaller ones spread less.
+// Of the price, where a cell is used twice as much as the mean. Windows answer prices all at once, so larger steps
+// swing: with 0.5 two of eight exemplars crowd into one corner for good; smaller ones spread less.
 static const float STEP = 0.2f;
 // A cell that is used more than four times as much as the mean rises no faster.
 static const float MAX_EXCESS = 3;
