@@ -3,8 +3,11 @@
 if(NOT CMAKE_C_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "RIFFLE_FUZZ needs clang: cmake --preset sanitizers")
 endif()
-# The library reports the paths taken, too: without that the fuzzers grope in the dark.
-target_compile_options(riffle_objects PRIVATE -fsanitize=fuzzer-no-link)
+# What readers run reports the paths taken, too: without that the fuzzers grope in the dark. The rest does not: no fuzzer
+# gets there, and the tests, which share these objects, would take two to three times as long.
+set(RIFFLE_TRACED_SOURCES ${RIFFLE_SOURCES})
+list(FILTER RIFFLE_TRACED_SOURCES INCLUDE REGEX "/src/(core|data|in)/")
+set_property(SOURCE ${RIFFLE_TRACED_SOURCES} APPEND PROPERTY COMPILE_OPTIONS -fsanitize=fuzzer-no-link)
 
 file(GLOB RIFFLE_FUZZ_SOURCES CONFIGURE_DEPENDS fuzz/fuzz_*.c)
 foreach(source ${RIFFLE_FUZZ_SOURCES})

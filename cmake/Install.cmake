@@ -41,6 +41,8 @@ if(BUILD_TESTING)
       add_test(NAME a_program_builds_against_the_installed_library_by_${way}
                COMMAND bash ${install_tests}/check_install.sh ${way} ${CMAKE_BINARY_DIR} ${install_tests}
                        ${CMAKE_C_COMPILER})
+      # Each of them writes the build folder's install_manifest.txt.
+      set_tests_properties(a_program_builds_against_the_installed_library_by_${way} PROPERTIES RESOURCE_LOCK install)
     endforeach()
   endif()
 endif()

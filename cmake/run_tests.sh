@@ -3,7 +3,10 @@
 # Runs the tests of a build folder and counts: run_tests.sh BUILD [options of ctest]
 # Every cmocka test counts as one, and every CTest test that is no cmocka program. Skipped and failed ones are named.
 # The last line is "N passed, N failed, N skipped"; the exit status is not 0 if anything failed.
+# Two programs run at a time (CTEST_PARALLEL_LEVEL): most use one thread for half of their time. Idle threads sleep
+# (OMP_WAIT_POLICY); by default they spin, which takes the processor from the other program and helps none.
 set -uo pipefail
+export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-2} OMP_WAIT_POLICY=${OMP_WAIT_POLICY:-passive}
 
 build=$1
 shift

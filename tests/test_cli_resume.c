@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the command stops at signals, and goes on where it stopped.
 #include "support/cli_check.h"
+#include "support/sanitized.h"
 
 #include <setjmp.h>
 #include <signal.h>
@@ -72,18 +73,20 @@ static void a_run_resumes_with_the_same_bytes_wherever_it_was_stopped(void **sta
                                         RESUME_LINE " --method sprites",
                                         RESUME_LINE " --method warp",
                                         RESUME_LINE " --uv --size 64x48"};
-    int stopped = 0;
+    // Every method is stopped by every signal, sanitizers or not.
+    int stopped = 0, runs = 0, step = TEST_SANITIZED ? 2 : 1;
     for (int l = 0; l < 6; ++l)
     {
         TestFolder whole = test_folder_make();
         expect(&whole, lines[l], 0);
-        for (int i = 0; i < 6; ++i)
+        for (int i = 0; i < 6; i += step, ++runs)
             stopped += break_and_resume(&whole, lines[l], signals[(i + l) % 3], places[i]);
         stopped += break_and_resume(&whole, lines[l], SIGKILL, 3);
+        ++runs;
         test_folder_remove(&whole);
     }
-    // Of 42; a fast machine may finish some before the signal.
-    assert_true(stopped >= 24);
+    // A fast machine may finish some before the signal.
+    assert_true(stopped >= runs * 4 / 7);
 }
 
 static void a_resumed_video_has_all_frames(void **state)

@@ -2,6 +2,7 @@
 #include "core/random.h"
 #include "core/simd.h"
 #include "kernels/neighbours.h"
+#include "support/sanitized.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -175,10 +176,11 @@ static bool window_is_valid(const Scene *s, int copy, int x, int y)
     return true;
 }
 
-static double slow_distance(const Scene *s, int q, int copy, int x, int y)
+// Stops where it has passed the limit.
+static double slow_distance(const Scene *s, int q, int copy, int x, int y, double limit)
 {
     double sum = 0;
-    for (int j = 0; j < s->side; ++j)
+    for (int j = 0; j < s->side && sum <= limit; ++j)
         for (int i = 0; i < s->side; ++i)
         {
             double known = s->known ? (double)s->mask[(q * s->side + j) * s->side + i] : 1;
@@ -233,9 +235,11 @@ static int slow_search(const Scene *s, double *least)
                 if (!window_is_valid(s, c, x, y))
                     continue;
                 for (int q = 0; q < QUERIES; ++q)
+                {
+                    double penalty = s->penalties ? (double)s->penalty[candidates] : 0;
                     if (!is_excluded(s, q, c, x, y))
-                        least[q] = fmin(least[q], slow_distance(s, q, c, x, y) +
-                                                      (s->penalties ? (double)s->penalty[candidates] : 0));
+                        least[q] = fmin(least[q], slow_distance(s, q, c, x, y, least[q] - penalty) + penalty);
+                }
                 ++candidates;
             }
     return candidates;
@@ -260,7 +264,7 @@ static void expect_nearest_in(const Scene *s)
         }
         assert_int_equal(rf_windows_at(s->database, m->place), m->candidate);
         assert_false(is_excluded(s, q, m->place.copy, m->place.x, m->place.y));
-        double distance = slow_distance(s, q, m->place.copy, m->place.x, m->place.y),
+        double distance = slow_distance(s, q, m->place.copy, m->place.x, m->place.y, INFINITY),
                score = distance + (s->penalties ? (double)s->penalty[m->candidate] : 0);
         assert_true(fabs((double)m->distance - distance) <= 2e-6 * distance);
         if (score > least[q] + 2e-6 * (fabs(least[q]) + distance))
@@ -279,7 +283,8 @@ static void expect_nearest_in_all_sizes(Scene s)
 {
     const int sides[] = {5, 9, 17, 2}, channels[] = {1, 2, 3, 5};
     for (int i = 0; i < 4; ++i)
-        for (int k = 0; k < 4; ++k)
+        // Sanitizers see every side twice and every number of channels, the largest windows among them.
+        for (int k = TEST_SANITIZED ? (i + 1) % 2 : 0; k < 4; k += TEST_SANITIZED ? 2 : 1)
         {
             Scene scene = s;
             scene.side = sides[i];
@@ -467,7 +472,7 @@ static void of_equal_candidates_the_lower_wins(void **state)
             for (int i = 0; i < matches[q].candidate; ++i)
             {
                 RfWindowPlace p = rf_windows_place(s.database, i);
-                double distance = slow_distance(&s, q, p.copy, p.x, p.y);
+                double distance = slow_distance(&s, q, p.copy, p.x, p.y, INFINITY);
                 assert_true(distance > 0 && distance * (1 + 2e-6) > (double)matches[q].distance);
                 float own[81], best[81];
                 rf_windows_read(s.database, i, own);

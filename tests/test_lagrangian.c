@@ -127,7 +127,7 @@ static void check_scene(RfFlow *flow, SceneMoments *scene, const RfExemplar *exe
     RfLagrangian *lagrangian = make(exemplar, options_of(radius, RF_BLEND_CONTRAST));
     RfImageView frame = view_of(g_frame, width, height, 3);
     int born = 0, retired = 0;
-    int frames = TEST_SANITIZED ? 75 : 300;
+    int frames = TEST_SANITIZED ? 40 : 300;
     for (int f = 1; f <= frames; ++f)
     {
         RfFlowView view = {0};

@@ -2,6 +2,7 @@
 // The measures agree with figures computed elsewhere, by other code, for results of four other tools on eight
 // exemplars (data/reference/peers/quality.csv): whoever is better there is better here.
 #include "support/peers.h"
+#include "support/sanitized.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -13,11 +14,19 @@
 
 static PeerTable g_theirs, g_ours;
 
+enum
+{
+    // All tools on each exemplar; sanitizers see two.
+    MOST_ROWS = TEST_SANITIZED ? 8 : 64,
+    FEWEST_PAIRS = TEST_SANITIZED ? 30 : 100
+};
+
 static int read_table(void **state)
 {
     (void)state;
     if (!peers_read(RF_SOURCE_DIR "/../shared/data", &g_theirs))
         print_message("no quality.csv in %s: set RIFFLE_DATA\n", g_theirs.folder);
+    g_theirs.count = g_theirs.count > MOST_ROWS ? MOST_ROWS : g_theirs.count;
     g_ours = g_theirs;
     return 0;
 }
@@ -66,7 +75,7 @@ static void every_pair_of_results_is_in_the_order_that_others_found(void **state
                               g_theirs.rows[j].values[v]);
             }
     print_message("%d comparisons, %d in another order\n", pairs, wrong);
-    assert_true(pairs >= 100);
+    assert_true(pairs >= FEWEST_PAIRS);
     assert_int_equal(wrong, 0);
 }
 

@@ -50,7 +50,7 @@ typedef struct RfOptimizeOptions
     int windows[RF_MAX_OPTIMIZE_WINDOWS];
     /// Search and assign steps with each window on the coarsest level, 1 to 100; half as many on each finer one.
     /// Default
-    /// 4. More lower the energy, little after 4.
+    /// 6. More lower the energy, little after 6.
     int iterations;
     RfOptimizeForm form;
     /// Price of using one place of the exemplar more than others, against the mean cost of a window, 0 to 100. Default

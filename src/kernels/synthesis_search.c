@@ -73,7 +73,8 @@ static float bring_inside(float at, int n, int half, bool tiles)
     if (!tiles)
         return rf_clamp(at, (float)half, (float)(n - 1 - half));
     at -= floorf((at + 0.5f) / (float)n) * (float)n;
-    return at;
+    // A little under -1/2 is rounded to n - 1/2, whose pixel would be n.
+    return at >= (float)n - 0.5f ? at - (float)n : rf_max(at, -0.5f);
 }
 
 static int whole(float at)

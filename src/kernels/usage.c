@@ -9,10 +9,9 @@ enum
     N = RF_USAGE_CELLS
 };
 
-// Of the price, where a cell is used twice as much as the mean. Windows answer prices all at once, so larger steps
-// swing: with 0.3 the lava of 256 x 256 pixels crowds into one corner on three levels, with 0.5 two of eight exemplars
-// do.
-static const float STEP = 0.1f;
+// Of the price, where a cell is used twice as much as the mean. Windows answer prices all at once, so larger steps swing:
+// with 0.5 two of eight exemplars crowd into one corner for good; smaller ones spread less.
+static const float STEP = 0.2f;
 // A cell that is used more than four times as much as the mean rises no faster.
 static const float MAX_EXCESS = 3;
 static const float MIN_PRICE = -1;

@@ -10,7 +10,7 @@ static const RfOption g_options[] = {
      "Levels of the pyramid; 0 picks them by the exemplar's size. More keep larger structures together."},
     {"windows", RF_OPTION_INTS, offsetof(RfOptimizeOptions, windows), "px", 5, RF_FIXED_SIDE, 17, "17,9",
      "Sides of the windows, odd, used one after the other on every level; large ones keep large structures together."},
-    {"iterations", RF_OPTION_INT, offsetof(RfOptimizeOptions, iterations), "", 1, 100, 4, NULL,
+    {"iterations", RF_OPTION_INT, offsetof(RfOptimizeOptions, iterations), "", 1, 100, 6, NULL,
      "Search and assign steps with each window on the coarsest level; half as many on each finer one."},
     {"form", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, form), "", 0, 1, RF_FORM_DISCRETE, "discrete|mean",
      "A pixel becomes one of the exemplar's (sharp), or the mean of what its windows say (smooth)."},
@@ -45,7 +45,7 @@ RfOptimizeOptions rf_optimize_defaults(void)
     return (RfOptimizeOptions){.struct_size = sizeof(RfOptimizeOptions),
                                .seed = 1,
                                .windows = {17, 9},
-                               .iterations = 4,
+                               .iterations = 6,
                                .spread = 2,
                                .search = RF_SEARCH_COHERENCE,
                                .similar = 2};
