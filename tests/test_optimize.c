@@ -17,7 +17,9 @@ static void bytes_are_the_same_for_any_number_of_threads(void **state)
         options.search = k ? RF_SEARCH_EXACT : RF_SEARCH_COHERENCE;
         options.tile = k;
         float *first = NULL;
-        for (int i = 0; i < 4; ++i)
+        if (TEST_SANITIZED)
+            options.windows[0] = 9, options.windows[1] = 0;
+        for (int i = 0; i < 4; i += 1 + TEST_SANITIZED)
         {
             rf_set_threads(threads[i]);
             float *pixels = still_of(exemplar, &options, NULL, 61, 54);
@@ -253,7 +255,7 @@ static void every_edge_of_every_option_makes_a_picture(void **state)
         else if (o->kind == RF_OPTION_BOOL)
             *(bool *)field = value != 0;
         else
-            *(int *)field = rf_min_int((int)value, TEST_SANITIZED ? 20 : 100);
+            *(int *)field = TEST_SANITIZED ? rf_min_int((int)value, 35) : (int)value;
         free(still_of(exemplar, &options, NULL, 36, 33));
     }
     static const int windows[][RF_MAX_OPTIMIZE_WINDOWS] = {{5}, {33}, {33, 17, 9, 5}, {5, 33}, {7, 7, 7, 7}};
