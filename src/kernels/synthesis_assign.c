@@ -213,11 +213,12 @@ static bool set_source(RfVec2 *source, RfVec2 place)
     return other;
 }
 
+// Means of equal places are equal to them only but for rounding: they are brought to whole pixels, or where places are
+// no whole pixels to 1/256 of one.
 static RfVec2 snap(const Assigning *a, RfVec2 place)
 {
-    if (a->assign->together > 0)
-        return place;
-    return (RfVec2){floorf(place.x + 0.5f), floorf(place.y + 0.5f)};
+    float steps = a->assign->together > 0 ? 256 : 1;
+    return (RfVec2){floorf(place.x * steps + 0.5f) / steps, floorf(place.y * steps + 0.5f) / steps};
 }
 
 // Returns true if the pixel became another.
@@ -283,7 +284,7 @@ static bool copy_cell(const Assigning *a, const Ballot *b, int x0, int y0, int x
         for (int x = x0; x < x1; ++x)
         {
             RfVec2 step = {(float)x - middle.x, (float)y - middle.y};
-            RfVec2 place = rf_vec2_add(agreed, rf_turn(turn, step));
+            RfVec2 place = snap(a, rf_vec2_add(agreed, rf_turn(turn, step)));
             if (!source_inside(assign->exemplar, place))
                 continue;
             other |= set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], place);

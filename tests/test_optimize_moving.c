@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+// The moving form of texture optimisation.
+#include "riffle/riffle.h"
+#include "support/scenes.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum
+{
+    SIDE = 64,
+    NUMBERS = SIDE * SIDE * 3,
+    FRAMES = 5
+};
+
+static RfExemplar *make_exemplar(void)
+{
+    return scene_noise_exemplar(48, 1);
+}
+
+static int channels_of(const RfExemplar *exemplar)
+{
+    return rf_optimize_channels(exemplar);
+}
+
+// One velocity everywhere, in pixels a frame.
+static void uniform(float *velocity, float u, float v)
+{
+    for (int i = 0; i < SIDE * SIDE; ++i)
+    {
+        velocity[2 * i] = u;
+        velocity[2 * i + 1] = v;
+    }
+}
+
+static void rotation(float *velocity, float radians)
+{
+    for (int y = 0; y < SIDE; ++y)
+        for (int x = 0; x < SIDE; ++x)
+        {
+            velocity[2 * (y * SIDE + x)] = -radians * ((float)y - 0.5f * (SIDE - 1));
+            velocity[2 * (y * SIDE + x) + 1] = radians * ((float)x - 0.5f * (SIDE - 1));
+        }
+}
+
+static void step(RfOptimize *o, const float *velocity, const uint8_t *mask, int time, int channels, float *pixels)
+{
+    RfFlowView flow = {.width = SIDE, .height = SIDE, .velocity = velocity, .mask = mask, .time = time};
+    RfImageView frame = {pixels, SIDE, SIDE, channels, (ptrdiff_t)SIDE * channels};
+    assert_int_equal(rf_optimize_step(o, &flow, &frame), RF_OK);
+}
+
+static RfOptimize *make(const RfExemplar *exemplar)
+{
+    RfOptimizeOptions options = rf_optimize_defaults();
+    options.iterations = 2;
+    RfOptimize *o = NULL;
+    assert_int_equal(rf_optimize_create(exemplar, &options, &o), RF_OK);
+    return o;
+}
+
+static void run(const RfExemplar *exemplar, const float *velocity, int frames, float *pixels)
+{
+    RfOptimize *o = make(exemplar);
+    for (int f = 0; f < frames; ++f)
+        step(o, velocity, NULL, f, channels_of(exemplar), pixels);
+    rf_optimize_destroy(o);
+}
+
+static void a_flow_that_stands_still_leaves_the_texture_as_it_is(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], first[NUMBERS], later[NUMBERS];
+    uniform(velocity, 0, 0);
+    run(exemplar, velocity, 1, first);
+    run(exemplar, velocity, 2, later);
+    int same = 0, channels = channels_of(exemplar);
+    for (int i = 0; i < SIDE * SIDE; ++i)
+        same += memcmp(first + i * channels, later + i * channels, (size_t)channels * sizeof *first) == 0;
+    // Windows that were at odds may still be mended.
+    assert_true(same > SIDE * SIDE * 9 / 10);
+    rf_exemplar_destroy(exemplar);
+}
+
+static void a_whole_shift_moves_the_texture_by_whole_pixels(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], first[NUMBERS], later[NUMBERS];
+    uniform(velocity, 2, 0);
+    run(exemplar, velocity, 1, first);
+    run(exemplar, velocity, 4, later);
+    int channels = channels_of(exemplar), same = 0, all = 0;
+    for (int y = 8; y < SIDE - 8; ++y)
+        for (int x = 20; x < SIDE - 8; ++x, ++all)
+            same += memcmp(first + (y * SIDE + x - 6) * channels, later + (y * SIDE + x) * channels,
+                           (size_t)channels * sizeof *first) == 0;
+    if (same < all * 3 / 4)
+        fail_msg("%d of %d pixels moved with the flow", same, all);
+    rf_exemplar_destroy(exemplar);
+}
+
+static void the_bytes_do_not_depend_on_threads(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], one[NUMBERS], many[NUMBERS];
+    rotation(velocity, 0.05f);
+    static const int threads[] = {2, 3, 8};
+    rf_set_threads(1);
+    run(exemplar, velocity, FRAMES, one);
+    for (int i = 0; i < 3; ++i)
+    {
+        rf_set_threads(threads[i]);
+        run(exemplar, velocity, FRAMES, many);
+        assert_memory_equal(one, many, (size_t)(SIDE * SIDE * channels_of(exemplar)) * sizeof *one);
+    }
+    rf_set_threads(0);
+    rf_exemplar_destroy(exemplar);
+}
+
+static void a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], whole[NUMBERS], resumed[NUMBERS];
+    RfOptimizeOptions options = rf_optimize_defaults();
+    options.iterations = 2;
+    rotation(velocity, 0.05f);
+    for (int cut = 0; cut < FRAMES; ++cut)
+    {
+        int channels = channels_of(exemplar);
+        RfOptimize *o = make(exemplar), *loaded = NULL;
+        for (int f = 0; f < cut; ++f)
+            step(o, velocity, NULL, f, channels, whole);
+        void *block = NULL;
+        size_t size = 0;
+        assert_int_equal(rf_optimize_save(o, &block, &size), RF_OK);
+        assert_int_equal(rf_optimize_load(exemplar, &options, block, size, &loaded), RF_OK);
+        for (int f = cut; f < FRAMES; ++f)
+        {
+            step(o, velocity, NULL, f, channels, whole);
+            step(loaded, velocity, NULL, f, channels, resumed);
+            assert_memory_equal(whole, resumed, (size_t)(SIDE * SIDE * channels) * sizeof *whole);
+        }
+        rf_optimize_destroy(loaded);
+        ((uint8_t *)block)[size - 1] ^= 1;
+        assert_int_equal(rf_optimize_load(exemplar, &options, block, size, &loaded), RF_BAD_INPUT);
+        assert_int_equal(rf_optimize_load(exemplar, &options, block, size / 2, &loaded), RF_BAD_INPUT);
+        assert_null(loaded);
+        rf_free(block);
+        rf_optimize_destroy(o);
+    }
+    rf_exemplar_destroy(exemplar);
+}
+
+static void land_is_zero_and_every_fluid_pixel_is_drawn(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], pixels[NUMBERS];
+    static uint8_t mask[SIDE * SIDE];
+    int channels = channels_of(exemplar);
+    rotation(velocity, 0.1f);
+    for (int i = 0; i < SIDE * SIDE; ++i)
+        mask[i] = i % SIDE < 24;
+    RfOptimize *o = make(exemplar);
+    for (int f = 0; f < FRAMES; ++f)
+    {
+        memset(pixels, 0xff, sizeof pixels);
+        step(o, velocity, mask, f, channels, pixels);
+        for (int i = 0; i < SIDE * SIDE * channels; ++i)
+            if (i / channels % SIDE >= 25)
+                assert_true(pixels[i] == 0);
+            else
+                assert_true(isfinite(pixels[i]));
+    }
+    rf_optimize_destroy(o);
+    rf_exemplar_destroy(exemplar);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_flow_that_stands_still_leaves_the_texture_as_it_is),
+        cmocka_unit_test(a_whole_shift_moves_the_texture_by_whole_pixels),
+        cmocka_unit_test(the_bytes_do_not_depend_on_threads),
+        cmocka_unit_test(a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused),
+        cmocka_unit_test(land_is_zero_and_every_fluid_pixel_is_drawn),
+    };
+    return cmocka_run_group_tests_name("optimize moving", tests, NULL, NULL);
+}
