@@ -55,6 +55,8 @@
     }
 
 METHOD_VERBS(lagrangian, RfLagrangian)
+METHOD_VERBS(optimize, RfOptimize)
+METHOD_DEFAULTS(optimize, RfOptimize)
 METHOD_VERBS(eulerian, RfEulerian)
 METHOD_DEFAULTS(eulerian, RfEulerian)
 METHOD_VERBS(dual, RfDual)
@@ -93,6 +95,15 @@ static int sprites_stages(const void *method, Stage stages[MAX_STAGES])
     return particle_stages(rf_sprites_stats(method), stages);
 }
 
+static int optimize_stages(const void *method, Stage stages[MAX_STAGES])
+{
+    RfOptimizeStats stats = rf_optimize_stats(method);
+    stages[0] = (Stage){"carry", stats.carry_seconds};
+    stages[1] = (Stage){"search", stats.search_seconds};
+    stages[2] = (Stage){"draw", stats.draw_seconds};
+    return 3;
+}
+
 // The last three differ: presets, layers, stages.
 #define METHOD(name, sentence, presets, layers, stages)                                                                \
     {                                                                                                                  \
@@ -103,6 +114,9 @@ static int sprites_stages(const void *method, Stage stages[MAX_STAGES])
 static const Method g_methods[] = {
     METHOD(lagrangian, "textured grids that follow the flow, fade in and out and are blended: the spectrum stays",
            "default|paper", lagrangian_layers, lagrangian_stages),
+    METHOD(optimize,
+           "windows of the exemplar that travel with the flow and are mended where they disagree: structure stays",
+           NULL, NULL, optimize_stages),
     METHOD(eulerian, "layers of carried coordinates, regenerated sooner where the flow deforms more", NULL, NULL, NULL),
     METHOD(dual, "two layers of carried coordinates that start afresh in turn", NULL, NULL, NULL),
     METHOD(sprites, "round pieces of the exemplar that the flow carries and does not bend", NULL, NULL, sprites_stages),

@@ -412,7 +412,7 @@ static void wrong_command_lines_are_refused_with_the_right_one(void **state)
         {GOOD "--velocity-scale inf", 2, "--velocity-scale inf: must be"},
         {GOOD "--threads 0", 2, "--threads 0: must be a whole number, 1 to 256"},
         {GOOD "--moment-every 0", 2, "--moment-every 0: must be a whole number, 1 to"},
-        {GOOD "--method euler", 2, "--method euler: must be lagrangian, eulerian, dual, sprites or warp"},
+        {GOOD "--method euler", 2, "--method euler: must be lagrangian, optimize, eulerian, dual, sprites or warp"},
         {GOOD "--method dual --reset-every 1", 2, "--reset-every 1: must be a whole number, 2 to 100000 frames"},
         {GOOD "--method dual --blend histogram", 2, "--blend histogram: must be plain or contrast"},
         {GOOD "--method dual --latency 9", 2, "--latency is an option of --method eulerian, not of dual"},

@@ -36,6 +36,7 @@
     }
 
 VERBS(lagrangian, RfLagrangian)
+VERBS(optimize, RfOptimize)
 VERBS(eulerian, RfEulerian)
 VERBS(dual, RfDual)
 VERBS(sprites, RfSprites)
@@ -65,6 +66,7 @@ static RfLagrangianStats sprites_stats(const void *method)
 static const Stepper g_steppers[] = {
     STEPPER("lagrangian", lagrangian_defaults, lagrangian, lagrangian_stats),
     STEPPER("paper", paper_defaults, lagrangian, lagrangian_stats),
+    STEPPER("optimize", optimize_defaults, optimize, NULL),
     STEPPER("eulerian", eulerian_defaults, eulerian, NULL),
     STEPPER("dual", dual_defaults, dual, NULL),
     STEPPER("sprites", sprites_defaults, sprites, sprites_stats),

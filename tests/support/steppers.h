@@ -7,6 +7,7 @@
 typedef union StepperOptions
 {
     RfLagrangianOptions lagrangian;
+    RfOptimizeOptions optimize;
     RfEulerianOptions eulerian;
     RfDualOptions dual;
     RfSpritesOptions sprites;
@@ -29,7 +30,7 @@ typedef struct Stepper
     RfLagrangianStats (*stats)(const void *method);
 } Stepper;
 
-/// "lagrangian", "paper" (lagrangian with the paper's constants), "eulerian", "dual", "sprites", "warp"; NULL if there
+/// "lagrangian", "paper" (lagrangian with the paper's constants), "optimize", "eulerian", "dual", "sprites", "warp"; NULL if there
 /// is none of the name.
 const Stepper *stepper_find(const char *name);
 

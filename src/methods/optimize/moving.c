@@ -171,6 +171,12 @@ typedef struct Carrying
     int steps;
 } Carrying;
 
+// Into -0.5 to n - 0.5.
+static float wrap(float at, int n)
+{
+    return at - floorf((at + 0.5f) / (float)n) * (float)n;
+}
+
 static void carry_row(void *context, int row, int worker)
 {
     (void)worker;
@@ -183,6 +189,8 @@ static void carry_row(void *context, int row, int worker)
         RfVec2 p = {(w->at.x + 0.5f) * scale_x, (w->at.y + 0.5f) * scale_y};
         p = rf_trace(k->flow, p, k->o->time, k->flow->time, k->steps);
         w->at = (RfVec2){p.x / scale_x - 0.5f, p.y / scale_y - 0.5f};
+        if (f->tiles)
+            w->at = (RfVec2){wrap(w->at.x, f->width), wrap(w->at.y, f->height)};
         if (k->o->options.orient == RF_ORIENT_FLOW)
             w->turn = flow_turn(k->flow, f->width, f->height, w->at);
     }
