@@ -13,7 +13,8 @@ size_t rf_search_row_room(const RfSearch *search)
     return (size_t)search->database->side * (size_t)search->database->row_numbers;
 }
 
-RF_WIDE_BODY void copy_in_range_body(const float *restrict from, int count, float *restrict to, int *restrict outside)
+RF_WIDE_BODY void rf_copy_in_range_body(const float *restrict from, int count, float *restrict to,
+                                        int *restrict outside)
 {
     int sum = 0;
 #pragma omp simd reduction(+ : sum)
@@ -26,7 +27,7 @@ RF_WIDE_BODY void copy_in_range_body(const float *restrict from, int count, floa
 }
 
 // *outside: how many numbers are too large, or not finite.
-RF_WIDE(copy_in_range, (const float *restrict from, int count, float *restrict to, int *restrict outside),
+RF_WIDE(rf_copy_in_range, (const float *restrict from, int count, float *restrict to, int *restrict outside),
         (from, count, to, outside))
 
 // Rows of a masked query are padded with 0. Numbers of weight 0 become 0.
@@ -133,7 +134,8 @@ static void load_plain(const RfSearch *search, RfSearchWorker *worker, int first
     {
         float *rows = worker->rows + (size_t)q * rf_search_row_room(search);
         int outside;
-        copy_in_range(search->queries->windows + (size_t)(first + q) * (size_t)d->numbers, d->numbers, rows, &outside);
+        rf_copy_in_range(search->queries->windows + (size_t)(first + q) * (size_t)d->numbers, d->numbers, rows,
+                         &outside);
         worker->query[q].valid = outside == 0;
         if (outside > 0)
             memset(rows, 0, rf_search_row_room(search) * sizeof *rows);

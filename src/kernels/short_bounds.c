@@ -104,8 +104,8 @@ float rf_short_limit(const RfShortNumbers *shorts, double distance, int32_t squa
 }
 
 // Numbers past the last are 0. What does not fit is made to, and told by its norm.
-RF_WIDE_BODY void round_numbers_body(const float *restrict numbers, float scale, int kept, int16_t *restrict out,
-                                     float *restrict norm, int32_t *restrict square)
+RF_WIDE_BODY void rf_round_numbers_body(const float *restrict numbers, float scale, int kept, int16_t *restrict out,
+                                        float *restrict norm, int32_t *restrict square)
 {
     float norms = 0;
     uint32_t squares = 0;
@@ -122,7 +122,7 @@ RF_WIDE_BODY void round_numbers_body(const float *restrict numbers, float scale,
     *square = (int32_t)squares;
 }
 
-RF_WIDE(round_numbers,
+RF_WIDE(rf_round_numbers,
         (const float *restrict numbers, float scale, int kept, int16_t *restrict out, float *restrict norm,
          int32_t *restrict square),
         (numbers, scale, kept, out, norm, square))
@@ -130,7 +130,7 @@ RF_WIDE(round_numbers,
 bool rf_shorten_query(const RfShortNumbers *shorts, const float *numbers, int count, int16_t *out, int32_t *square)
 {
     float norm;
-    round_numbers(numbers, shorts->scale, count, out, &norm, square);
+    rf_round_numbers(numbers, shorts->scale, count, out, &norm, square);
     return norm <= QUERY_NORM * QUERY_NORM;
 }
 

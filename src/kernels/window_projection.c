@@ -72,8 +72,9 @@ int rf_block_numbers(const RfWindowDatabase *d)
     return (d->numbers + RF_WINDOW_BLOCK - 1) / RF_WINDOW_BLOCK * RF_WINDOW_BLOCK;
 }
 
-RF_WIDE_BODY void centre_body(const float *restrict window, const float *restrict means, const float *restrict scales,
-                              int blocks, float *restrict out, float *restrict norm)
+RF_WIDE_BODY void rf_centre_numbers_body(const float *restrict window, const float *restrict means,
+                                         const float *restrict scales, int blocks, float *restrict out,
+                                         float *restrict norm)
 {
     float sums[RF_WINDOW_BLOCK] = {0}, sum = 0;
     for (int b = 0; b < blocks; ++b)
@@ -95,7 +96,7 @@ RF_WIDE_BODY void centre_body(const float *restrict window, const float *restric
     *norm = sum;
 }
 
-RF_WIDE(centre,
+RF_WIDE(rf_centre_numbers,
         (const float *restrict window, const float *restrict means, const float *restrict scales, int blocks,
          float *restrict out, float *restrict norm),
         (window, means, scales, blocks, out, norm))
@@ -103,7 +104,8 @@ RF_WIDE(centre,
 float rf_centre_window(const RfWindowDatabase *d, const float *window, int q, float *windows)
 {
     float norm;
-    centre(window, d->means, d->scales, rf_block_numbers(d) / RF_WINDOW_BLOCK, windows + q * RF_WINDOW_BLOCK, &norm);
+    rf_centre_numbers(window, d->means, d->scales, rf_block_numbers(d) / RF_WINDOW_BLOCK, windows + q * RF_WINDOW_BLOCK,
+                      &norm);
     return norm;
 }
 
