@@ -30,8 +30,8 @@ typedef struct Stepper
     RfLagrangianStats (*stats)(const void *method);
 } Stepper;
 
-/// "lagrangian", "paper" (lagrangian with the paper's constants), "optimize", "eulerian", "dual", "sprites", "warp"; NULL if there
-/// is none of the name.
+/// "lagrangian", "paper" (lagrangian with the paper's constants), "optimize", "eulerian", "dual", "sprites", "warp";
+/// NULL if there is none of the name.
 const Stepper *stepper_find(const char *name);
 
 /// The field of `options` that an option stands for, and its kind; NULL if there is none of the name.
