@@ -4,7 +4,8 @@
 //   bench_synth peers [runs=3] [seeds=1] [only=TEXT] [threads=N] [windows=17,9] [OPTION=VALUE ...]
 //   bench_synth speed [runs=3] [only=TEXT] [windows=17,9] [OPTION=VALUE ...]
 //
-// OPTION is any of rf_optimize_still, choices by their names: seed=, spread=, iterations=, similar=, search=exact, ...
+// Without arguments both, the first only where its data are. OPTION is any of rf_optimize_still, choices by their
+// names: seed=, spread=, iterations=, similar=, search=exact, ...
 //
 // peers: 512 x 512 pixels from each exemplar of $RIFFLE_DATA/reference/peers, judged as its figures were. CSV:
 // exemplar,tool,residual,share,spectrum,verbatim,seconds (median of runs; of others as they are told, on as many
@@ -217,13 +218,13 @@ static void keep_named(PeerTable *table, const char *only)
     table->count = kept;
 }
 
-static void run_peers(const Settings *s)
+static bool run_peers(const Settings *s)
 {
     static PeerTable others, table;
     if (!peers_read(RF_SOURCE_DIR "/../shared/data", &others))
     {
         fprintf(stderr, "bench_synth: %s: no quality.csv there; set RIFFLE_DATA\n", others.folder);
-        exit(1);
+        return false;
     }
     keep_named(&others, s->only);
     printf("exemplar,tool,residual,share,spectrum,verbatim,seconds\n");
@@ -247,6 +248,7 @@ static void run_peers(const Settings *s)
         printf("# seed %llu\n", (unsigned long long)options.seed);
         print_summary(&table);
     }
+    return true;
 }
 
 // ---- speed
@@ -307,13 +309,13 @@ int main(int argc, char **argv)
 {
     static Settings settings;
     const char *what = argc > 1 ? argv[1] : "";
-    bool peers = strcmp(what, "peers") == 0;
-    if (!peers && strcmp(what, "speed") != 0)
+    bool peers = strcmp(what, "peers") == 0, speed = strcmp(what, "speed") == 0;
+    if (argc > 1 && !peers && !speed)
         return fprintf(stderr, "bench_synth: the first argument must be peers or speed\n"), 2;
     parse(argc, argv, &settings);
-    if (peers)
-        run_peers(&settings);
-    else
+    if (!speed && !run_peers(&settings) && peers)
+        return 1;
+    if (!peers)
         run_speed(&settings);
     return 0;
 }
