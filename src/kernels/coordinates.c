@@ -21,6 +21,7 @@
 #include "core/result.h"
 #include "core/simd.h"
 #include "kernels/cubic_spline.h"
+#include "kernels/nearest_known.h"
 #include "kernels/tracing.h"
 
 #include <string.h>
@@ -64,22 +65,7 @@ static void carry_band(void *context, int item, int worker)
         }
 }
 
-// Takes neighbour (x + dx, y + dy)'s nearest fluid pixel if that is nearer to (x, y).
-static void pass_on(const RfCoordinates *c, int x, int y, int dx, int dy)
-{
-    if (x + dx < 0 || x + dx >= c->width || y + dy < 0 || y + dy >= c->height)
-        return;
-    int32_t *own = c->nearest + (size_t)y * (size_t)c->width + (size_t)x;
-    int32_t other = own[(ptrdiff_t)dy * c->width + dx];
-    if (other < 0)
-        return;
-    int64_t ox = other % c->width - x, oy = other / c->width - y;
-    int64_t nx = *own % c->width - x, ny = *own / c->width - y;
-    if (*own < 0 || ox * ox + oy * oy < nx * nx + ny * ny)
-        *own = other;
-}
-
-// Land takes the offsets of its nearest fluid pixel (Danielsson. Euclidean distance mapping. 1980).
+// Land takes the offsets of its nearest fluid pixel.
 static void extend_over_land(const RfCoordinates *c, const RfFlowView *flow)
 {
     int w = c->width, h = c->height;
@@ -89,22 +75,7 @@ static void extend_over_land(const RfCoordinates *c, const RfFlowView *flow)
             size_t k = (size_t)y * (size_t)w + (size_t)x;
             c->nearest[k] = rf_pixel_inside(flow, w, h, x, y) ? (int32_t)k : -1;
         }
-    for (int y = 0; y < h; ++y)
-    {
-        for (int x = 0; x < w; ++x)
-            for (int dx = -1; dx <= 1; ++dx)
-                pass_on(c, x, y, dx, dx < 0 ? 0 : -1);
-        for (int x = w - 1; x >= 0; --x)
-            pass_on(c, x, y, 1, 0);
-    }
-    for (int y = h - 1; y >= 0; --y)
-    {
-        for (int x = w - 1; x >= 0; --x)
-            for (int dx = -1; dx <= 1; ++dx)
-                pass_on(c, x, y, dx, dx > 0 ? 0 : 1);
-        for (int x = 0; x < w; ++x)
-            pass_on(c, x, y, -1, 0);
-    }
+    rf_spread_nearest(c->nearest, w, h);
     size_t numbers = 2 * (size_t)c->sets;
     for (size_t k = 0; k < (size_t)w * (size_t)h; ++k)
         if (c->nearest[k] >= 0 && c->nearest[k] != (int32_t)k)
