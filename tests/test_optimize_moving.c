@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The moving form of texture optimisation.
+#include "kernels/nearest_known.h"
 #include "riffle/riffle.h"
 #include "support/scenes.h"
 
@@ -185,6 +186,73 @@ static void land_is_zero_and_every_fluid_pixel_is_drawn(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
+static void a_frame_swept_empty_in_one_step_is_full_again(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], first[NUMBERS], later[NUMBERS];
+    int channels = channels_of(exemplar);
+    uniform(velocity, 1e5f, 0);
+    run(exemplar, velocity, 1, first);
+    run(exemplar, velocity, 2, later);
+    // With nothing to continue the texture stays.
+    int same = 0;
+    for (int i = 0; i < SIDE * SIDE; ++i)
+        same += memcmp(first + i * channels, later + i * channels, (size_t)channels * sizeof *first) == 0;
+    assert_true(same > SIDE * SIDE * 9 / 10);
+    rf_exemplar_destroy(exemplar);
+}
+
+static void an_exemplar_with_a_guide_is_refused(void **state)
+{
+    (void)state;
+    static float pixels[32 * 32 * 3];
+    RfMapView maps[] = {{"colour", RF_MAP_COLOUR, {pixels, 32, 32, 3, 96}, 1},
+                        {"guide", RF_MAP_DATA, {pixels, 32, 32, 3, 96}, 1}};
+    RfExemplar *exemplar = NULL;
+    RfOptimize *o = NULL;
+    RfOptimizeOptions options = rf_optimize_defaults();
+    assert_int_equal(rf_exemplar_create(maps, 2, RF_TILING_NO, &exemplar), RF_OK);
+    assert_int_equal(rf_optimize_create(exemplar, &options, &o), RF_BAD_INPUT);
+    assert_null(o);
+    rf_exemplar_destroy(exemplar);
+}
+
+static void every_cell_finds_its_nearest_known_one(void **state)
+{
+    (void)state;
+    enum
+    {
+        W = 37,
+        H = 23
+    };
+    int32_t nearest[W * H];
+    for (int known = 0; known <= 40; known += 5)
+    {
+        bool is_known[W * H] = {false};
+        for (int i = 0; i < known; ++i)
+            is_known[(i * 7919 + 31) % (W * H)] = true;
+        for (int i = 0; i < W * H; ++i)
+            nearest[i] = is_known[i] ? i : -1;
+        rf_spread_nearest(nearest, W, H);
+        int farther = 0;
+        for (int i = 0; i < W * H; ++i)
+        {
+            int least = INT32_MAX;
+            for (int k = 0; k < W * H; ++k)
+                if (is_known[k])
+                {
+                    int dx = k % W - i % W, dy = k / W - i / W;
+                    least = dx * dx + dy * dy < least ? dx * dx + dy * dy : least;
+                }
+            assert_true(known == 0 ? nearest[i] == -1 : is_known[nearest[i]]);
+            int dx = known ? nearest[i] % W - i % W : 0, dy = known ? nearest[i] / W - i / W : 0;
+            farther += known && dx * dx + dy * dy > least;
+        }
+        assert_true(farther <= W * H / 100);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -192,6 +260,9 @@ int main(void)
         cmocka_unit_test(a_whole_shift_moves_the_texture_by_whole_pixels),
         cmocka_unit_test(the_bytes_do_not_depend_on_threads),
         cmocka_unit_test(a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused),
+        cmocka_unit_test(a_frame_swept_empty_in_one_step_is_full_again),
+        cmocka_unit_test(an_exemplar_with_a_guide_is_refused),
+        cmocka_unit_test(every_cell_finds_its_nearest_known_one),
         cmocka_unit_test(land_is_zero_and_every_fluid_pixel_is_drawn),
     };
     return cmocka_run_group_tests_name("optimize moving", tests, NULL, NULL);

@@ -68,11 +68,10 @@ void rf_synthesis_place(RfSynthesisFrame *frame, const RfVec2 *turns)
     for (int j = 0; j < frame->rows; ++j)
         for (int i = 0; i < frame->columns; ++i)
         {
-            int x = rf_min_int(i * frame->spacing + frame->spacing / 2, frame->width - 1);
-            int y = rf_min_int(j * frame->spacing + frame->spacing / 2, frame->height - 1);
-            size_t pixel = (size_t)y * (size_t)frame->width + (size_t)x;
+            RfVec2 at = rf_synthesis_cell_middle(frame, i, j);
+            size_t pixel = (size_t)at.y * (size_t)frame->width + (size_t)at.x;
             frame->windows[(ptrdiff_t)j * frame->columns + i] = (RfSynthesisWindow){
-                .at = {(float)x, (float)y},
+                .at = at,
                 .source = frame->sources[pixel],
                 .turn = turns ? turns[pixel] : (RfVec2){1, 0},
                 .exists = true,
@@ -137,4 +136,25 @@ void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemp
     Show show = {frame, exemplar, exemplar->channels - guides};
     rf_parallel_for(frame->height, show_row, &show);
     rf_fixed_extend(&frame->picture, frame->tiles);
+}
+
+static int margin_of(const RfSynthesisExemplar *exemplar, int side)
+{
+    return exemplar->tiles ? 0 : side / 2;
+}
+
+void rf_synthesis_settle_prices(const RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int side,
+                                RfUsage *usage)
+{
+    for (int i = 0; i < frame->columns * frame->rows; ++i)
+        if (frame->windows[i].exists)
+            rf_usage_add(usage, exemplar->width, exemplar->height, margin_of(exemplar, side),
+                         frame->windows[i].source.x, frame->windows[i].source.y);
+    rf_usage_settle(usage);
+}
+
+void rf_synthesis_prices(const RfSynthesisExemplar *exemplar, int side, const RfUsage *usage, float scale,
+                         float *prices)
+{
+    rf_usage_prices(usage, exemplar->width, exemplar->height, margin_of(exemplar, side), scale, prices);
 }

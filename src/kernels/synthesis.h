@@ -53,7 +53,7 @@ typedef struct RfSynthesisFrame
     bool tiles;
     int spacing, columns, rows;
     RfSynthesisWindow *windows;
-    /// Of cells: a pixel became another in the last assignment.
+    /// Of cells: a pixel became another in the last assignment, or see RfSynthesisAssign.carried.
     uint8_t *stirred;
     /// [height][width]: where each pixel comes from in the exemplar.
     RfVec2 *sources;
@@ -83,6 +83,13 @@ RfResult rf_synthesis_frame_create(int width, int height, int channels, bool til
 void rf_synthesis_frame_free(RfSynthesisFrame *frame);
 /// Cuts the frame into cells of `spacing`, without windows.
 RfResult rf_synthesis_cut(RfSynthesisFrame *frame, int spacing);
+/// The pixel in the middle of a cell.
+static inline RfVec2 rf_synthesis_cell_middle(const RfSynthesisFrame *frame, int column, int row)
+{
+    int x = column * frame->spacing + frame->spacing / 2, y = row * frame->spacing + frame->spacing / 2;
+    return (RfVec2){(float)(x < frame->width ? x : frame->width - 1),
+                    (float)(y < frame->height ? y : frame->height - 1)};
+}
 /// A window in the middle of every cell; it lies as `turns` ([height][width], NULL: all (1, 0)) say there, and
 /// continues the frame's sources.
 void rf_synthesis_place(RfSynthesisFrame *frame, const RfVec2 *turns);
@@ -92,6 +99,13 @@ void rf_synthesis_scatter(RfSynthesisFrame *frame, const RfSynthesisExemplar *ex
 void rf_synthesis_refine(const RfSynthesisFrame *coarse, RfSynthesisFrame *fine);
 /// Sets the picture from the sources, but for its last `guides` channels.
 void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int guides);
+
+/// Moves the prices by where the frame's windows, of this side, come from.
+void rf_synthesis_settle_prices(const RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int side,
+                                RfUsage *usage);
+/// Prices for RfSynthesisSearch: those of the exemplar's cells times `scale`.
+void rf_synthesis_prices(const RfSynthesisExemplar *exemplar, int side, const RfUsage *usage, float scale,
+                         float *prices);
 
 typedef struct RfSynthesisSearch
 {
@@ -136,7 +150,7 @@ typedef struct RfSynthesisAssign
     bool robust;
     /// Offsets that differ by up to this, in exemplar pixels, are one: their mean is taken. 0 for still pictures.
     float together;
-    /// Windows may lie anywhere in their cells.
+    /// Cells are stirred where their windows are at odds, not where a pixel became another: all of a carried frame do.
     bool carried;
     /// Cells where nothing has changed too.
     bool all;

@@ -17,7 +17,7 @@
 
 enum
 {
-    // Windows over a cell: 7 x 7 cells' where they lie anywhere, spacing being a quarter of a window or more.
+    // Windows over a cell: those of 5 x 5 cells with a spacing of a quarter of a window, 7 x 7 with one of a pixel.
     MAX_VOTES = 81,
     FALL_STEPS = 16,
     MAX_FALL = (RF_FIXED_SIDE / 2 + 2) * FALL_STEPS
@@ -326,7 +326,6 @@ static void assign_row(void *context, int row, int worker)
                     for (int x = x0; x < x1; ++x)
                         other |= assign_pixel(a, b, x, y);
         }
-        // A carried pixel is always another; what matters there is whether its windows are at odds.
         f->stirred[(ptrdiff_t)row * f->columns + i] = assign->carried ? b->groups > 1 : other;
     }
 }

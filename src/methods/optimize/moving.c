@@ -27,6 +27,7 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/result.h"
+#include "kernels/nearest_known.h"
 #include "kernels/tracing.h"
 
 #include <stdlib.h>
@@ -45,6 +46,9 @@ RfResult rf_optimize_create(const RfExemplar *exemplar, const RfOptimizeOptions 
     RF_REQUIRE(exemplar && options && out, "rf_optimize_create: exemplar, options or out is NULL");
     *out = NULL;
     RF_TRY(rf_optimize_check(options));
+    if (rf_optimize_channels(exemplar) < rf_exemplar_channels(exemplar))
+        return rf_fail(RF_BAD_INPUT, NULL, NULL, "a map named %s belongs to still textures: leave it out",
+                       RF_GUIDE_MAP);
     RfOptimize *o = rf_allocate_zero(1, sizeof *o);
     if (!o)
         return RF_OUT_OF_MEMORY;
@@ -64,6 +68,7 @@ void rf_optimize_destroy(RfOptimize *o)
     rf_fixed_free(&o->held);
     rf_release(o->hold);
     rf_release(o->prices);
+    rf_release(o->nearest);
     rf_release(o);
 }
 
@@ -143,7 +148,8 @@ RfResult rf_optimize_make_room(RfOptimize *o)
     o->next = rf_allocate((size_t)f->columns * (size_t)f->rows, sizeof *o->next);
     o->hold = rf_allocate((size_t)f->width * (size_t)f->height, sizeof *o->hold);
     o->prices = rf_allocate((size_t)e->width * (size_t)e->height, sizeof *o->prices);
-    if (!o->next || !o->hold || !o->prices)
+    o->nearest = rf_allocate((size_t)f->columns * (size_t)f->rows, sizeof *o->nearest);
+    if (!o->next || !o->hold || !o->prices || !o->nearest)
         return RF_OUT_OF_MEMORY;
     return measure_gradient(o);
 }
@@ -226,49 +232,28 @@ static void put_into_cells(RfOptimize *o)
     o->next = swap;
 }
 
-// The nearest window that was carried, in rings of cells; NULL if there is none within reach.
-static const RfSynthesisWindow *nearest_window(const RfSynthesisFrame *f, int column, int row)
-{
-    for (int r = 1; r < rf_max_int(f->columns, f->rows); ++r)
-    {
-        const RfSynthesisWindow *best = NULL;
-        float least = INFINITY;
-        for (int j = rf_max_int(row - r, 0); j <= rf_min_int(row + r, f->rows - 1); ++j)
-            for (int i = rf_max_int(column - r, 0); i <= rf_min_int(column + r, f->columns - 1);
-                 i += abs(j - row) == r ? 1 : rf_max_int(2 * r, 1))
-            {
-                const RfSynthesisWindow *w = &f->windows[(ptrdiff_t)j * f->columns + i];
-                float dx = (float)(i - column), dy = (float)(j - row);
-                if (w->exists && !w->changed && dx * dx + dy * dy < least)
-                {
-                    least = dx * dx + dy * dy;
-                    best = w;
-                }
-            }
-        if (best)
-            return best;
-    }
-    return NULL;
-}
-
-// Empty cells get a window that continues the nearest one: sound texture from the first, if not the best.
+// Empty cells get a window that continues the nearest carried one: sound texture from the first, if not the best. Where
+// the flow swept all windows out, the texture stays as it is.
 static void fill_cells(RfOptimize *o)
 {
     RfSynthesisFrame *f = &o->start.frame;
-    for (int j = 0; j < f->rows; ++j)
-        for (int i = 0; i < f->columns; ++i)
-        {
-            RfSynthesisWindow *w = &f->windows[(ptrdiff_t)j * f->columns + i];
-            const RfSynthesisWindow *from = w->exists ? NULL : nearest_window(f, i, j);
-            if (!from)
-                continue;
-            RfVec2 at = {(float)rf_min_int(i * f->spacing + f->spacing / 2, f->width - 1),
-                         (float)rf_min_int(j * f->spacing + f->spacing / 2, f->height - 1)};
-            *w = *from;
-            w->at = at;
-            w->source = rf_vec2_add(from->source, rf_turn(from->turn, rf_vec2_sub(at, from->at)));
-            w->changed = true; // not carried
-        }
+    int cells = f->columns * f->rows;
+    for (int i = 0; i < cells; ++i)
+        o->nearest[i] = f->windows[i].exists ? i : -1;
+    rf_spread_nearest(o->nearest, f->columns, f->rows);
+    if (o->nearest[0] < 0)
+        rf_synthesis_place(f, NULL);
+    for (int i = 0; i < cells; ++i)
+    {
+        if (o->nearest[i] < 0 || o->nearest[i] == i)
+            continue;
+        const RfSynthesisWindow *from = &f->windows[o->nearest[i]];
+        RfVec2 at = rf_synthesis_cell_middle(f, i % f->columns, i / f->columns);
+        f->windows[i] = *from;
+        f->windows[i].at = at;
+        f->windows[i].source = rf_vec2_add(from->source, rf_turn(from->turn, rf_vec2_sub(at, from->at)));
+        f->windows[i].changed = true; // not carried
+    }
 }
 
 static void carry(RfOptimize *o, const RfFlowView *flow)
@@ -319,12 +304,8 @@ static RfResult mend(RfOptimize *o)
 {
     RfSynthesisFrame *f = &o->start.frame;
     const RfSynthesisExemplar *e = &o->start.material.levels[0];
-    int margin = e->tiles ? 0 : o->start.side / 2;
-    for (int i = 0; i < f->columns * f->rows; ++i)
-        rf_usage_add(&o->start.usage, e->width, e->height, margin, f->windows[i].source.x, f->windows[i].source.y);
-    rf_usage_settle(&o->start.usage);
-    rf_usage_prices(&o->start.usage, e->width, e->height, margin, o->options.spread * (float)o->energy.compared,
-                    o->prices);
+    rf_synthesis_settle_prices(f, e, o->start.side, &o->start.usage);
+    rf_synthesis_prices(e, o->start.side, &o->start.usage, o->options.spread * (float)o->energy.compared, o->prices);
     rf_parallel_for(f->height, hold_row, o);
     RfSynthesisSearch search = {
         .exemplar = e,

@@ -17,9 +17,11 @@ struct RfOptimize
     RfFixedPicture held;
     float *hold;
     float *prices;
+    /// Of each cell, the nearest one with a carried window.
+    int32_t *nearest;
     /// 95th percentile of the exemplar's gradient, in fixed-point units.
     float gradient;
-    /// Of the windows compared in the last step.
+    /// Of the last step; 0 before the second.
     RfSynthesisEnergy energy;
     uint64_t round;
     double seconds[3];

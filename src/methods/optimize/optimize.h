@@ -6,14 +6,14 @@
 #include "riffle/optimize.h"
 
 RfResult rf_optimize_check(const RfOptimizeOptions *options);
+
 /// What a still picture leaves for a moving one to start from. Owned by whoever gets it.
 typedef struct RfOptimizeStart
 {
     RfSynthesisMaterial material;
     RfSynthesisFrame frame;
     RfUsage usage;
-    /// Mean cost of the last windows when they were first searched, and their side.
-    float energy;
+    /// Of the last windows.
     int side;
 } RfOptimizeStart;
 

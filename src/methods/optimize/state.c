@@ -34,8 +34,7 @@ static uint64_t inputs_hash(const RfExemplar *exemplar, const RfOptimizeOptions 
 {
     int count;
     const RfOption *table = rf_optimize_option_table(&count);
-    uint64_t hash = rf_options_hash(options, table, count, exemplar->hash);
-    return rf_hash_bytes(options->windows, sizeof options->windows, hash);
+    return rf_options_hash(options, table, count, exemplar->hash);
 }
 
 static uint64_t content_hash(StateHeader header, const void *rest, size_t size)

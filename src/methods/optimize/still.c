@@ -344,15 +344,11 @@ static RfResult assign_step(Still *s, bool robust, bool all)
 static void set_prices(Still *s, double energy)
 {
     const RfSynthesisExemplar *e = &s->material.levels[s->level];
-    int margin = e->tiles ? 0 : s->side / 2;
-    for (int i = 0; i < s->frame.columns * s->frame.rows; ++i)
-        rf_usage_add(&s->usage, e->width, e->height, margin, s->frame.windows[i].source.x,
-                     s->frame.windows[i].source.y);
-    rf_usage_settle(&s->usage);
+    rf_synthesis_settle_prices(&s->frame, e, s->side, &s->usage);
     // Not the present energy: that of a frame that collapses falls, and the prices with it.
     if (s->first_energy < 0)
         s->first_energy = (float)energy;
-    rf_usage_prices(&s->usage, e->width, e->height, margin, s->options->spread * s->first_energy, s->prices);
+    rf_synthesis_prices(e, s->side, &s->usage, s->options->spread * s->first_energy, s->prices);
 }
 
 static double pixels_of(const Still *s, int level)
@@ -520,7 +516,7 @@ RfResult rf_optimize_start(const RfExemplar *exemplar, const RfOptimizeOptions *
 {
     Still *s;
     RF_TRY(make_still(exemplar, options, constraints, width, height, &s));
-    *out = (RfOptimizeStart){s->material, s->frame, s->usage, s->first_energy, s->side};
+    *out = (RfOptimizeStart){s->material, s->frame, s->usage, s->side};
     s->material = (RfSynthesisMaterial){0};
     s->frame = (RfSynthesisFrame){0};
     free_still(s);
