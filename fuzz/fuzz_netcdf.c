@@ -3,4 +3,4 @@
 // survive.
 #include "flow_fuzz.h"
 
-RF_FUZZ_FLOW(rf_flow_format_netcdf)
+RF_FUZZ_FLOW(rf_flow_format_netcdf, true)

@@ -137,6 +137,28 @@ static void a_damaged_netcdf_is_refused(void **state)
         "standard names); it has: salt; name them with --variables");
 }
 
+static void a_netcdf_cut_in_a_later_moment_gives_the_first(void **state)
+{
+    (void)state;
+    if (no_netcdf())
+    {
+        print_message("this build reads no NetCDF\n");
+        skip();
+    }
+    const char *const names[] = {"time", "y", "x"};
+    const int sizes[] = {4, 2, 3};
+    const TestNcVariable variables[] = {
+        {.name = "u", .dimension_count = 3, .dimensions = {0, 1, 2}, .values = numbers},
+        {.name = "v", .dimension_count = 3, .dimensions = {0, 1, 2}, .values = numbers}};
+    test_nc(&file, names, sizes, 3, variables, 2);
+    file.size -= 4;
+    RfFlowView view;
+    RfFlow *flow = open_first(save("cut.nc"), &view);
+    assert_int_equal(rf_flow_at(flow, rf_flow_info(flow).last_frame, &view), RF_BAD_INPUT);
+    assert_non_null(strstr(rf_last_error()->message, "the file is cut"));
+    rf_flow_close(flow);
+}
+
 static RfResult crash(const RfFlowSource *source, int moment, RfFlowMoment *out)
 {
     (void)source;
@@ -190,6 +212,7 @@ int main(void)
         cmocka_unit_test(a_small_file_with_a_large_extent_is_refused_before_memory_is_asked_for),
         cmocka_unit_test(broken_numbers_are_refused_with_a_reason),
         cmocka_unit_test(a_damaged_netcdf_is_refused),
+        cmocka_unit_test(a_netcdf_cut_in_a_later_moment_gives_the_first),
         cmocka_unit_test(a_library_that_dies_is_survived),
         cmocka_unit_test(options_out_of_range_are_refused),
     };

@@ -19,10 +19,14 @@
 #include "core/memory.h"
 #include "core/result.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 static bool netcdf_probe(const uint8_t *bytes, size_t size)
 {
@@ -88,10 +92,11 @@ typedef struct Reader
     double velocity_unit;
 } Reader;
 
+// Of a mapped file EPERM says that its end is passed.
 static RfResult netcdf_failed(const Reader *reader, int status, const char *place)
 {
     return rf_fail(status == NC_ENOMEM ? RF_OUT_OF_MEMORY : RF_BAD_INPUT, reader->source->path, place,
-                   "cannot be read as NetCDF: %s", nc_strerror(status));
+                   "cannot be read as NetCDF: %s", status == EPERM ? "the file is cut" : nc_strerror(status));
 }
 
 #define NC_TRY(reader, place, expression)                                                                              \
@@ -453,9 +458,6 @@ static RfResult check_file_size(const Reader *reader)
         nc_inq_type(reader->file, type, NULL, &number);
         bytes += (uint64_t)reader->x.count * reader->y.count * number;
     }
-    struct stat status;
-    if (!reader->source->bytes && stat(reader->source->path, &status) == 0)
-        size = (uint64_t)status.st_size;
     if (size < bytes)
         return rf_fail(RF_BAD_INPUT, reader->source->path, "data",
                        "%zu x %zu cells need %llu bytes, the file has %llu: it is cut", reader->x.count,
@@ -484,22 +486,46 @@ static RfResult take_moment(const Reader *reader, int moment, RfFlowMoment *out)
     return RF_OK;
 }
 
-// Runs in the child.
-static RfResult read_here(const RfFlowSource *source, int moment, RfFlowMoment *out)
+// The NetCDF library takes what lies behind the end of a classic file for zeros, but not behind that of memory.
+static RfFlowSource map_classic(const RfFlowSource *source)
 {
+    RfFlowSource mapped = *source;
+    struct stat status;
+    char magic[3] = "";
+    int file = source->bytes ? -1 : open(source->path, O_RDONLY | O_CLOEXEC);
+    if (file >= 0 && fstat(file, &status) == 0 && pread(file, magic, 3, 0) == 3 && memcmp(magic, "CDF", 3) == 0)
+    {
+        void *bytes = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_PRIVATE, file, 0);
+        if (bytes != MAP_FAILED)
+        {
+            mapped.bytes = bytes;
+            mapped.size = (size_t)status.st_size;
+        }
+    }
+    if (file >= 0)
+        close(file);
+    return mapped;
+}
+
+// Runs in the child, whose end unmaps the file.
+static RfResult read_here(const RfFlowSource *given, int moment, RfFlowMoment *out)
+{
+    RfFlowSource source = map_classic(given);
     Reader *reader = rf_allocate_zero(1, sizeof *reader);
     if (!reader)
         return RF_OUT_OF_MEMORY;
-    reader->source = source;
-    int status = source->bytes
-                     ? nc_open_mem("memory.nc", NC_NOWRITE, source->size, (void *)source->bytes, &reader->file)
-                     : nc_open(source->path, NC_NOWRITE, &reader->file);
+    reader->source = &source;
+    int status = source.bytes ? nc_open_mem("memory.nc", NC_NOWRITE, source.size, (void *)source.bytes, &reader->file)
+                              : nc_open(source.path, NC_NOWRITE, &reader->file);
+    // It does not open memory that ends within 8 bytes of the header.
+    if (status != NC_NOERR && !given->bytes)
+        status = nc_open(source.path, NC_NOWRITE, &reader->file);
     RfResult result = status == NC_NOERR ? RF_OK : netcdf_failed(reader, status, NULL);
     if (status == NC_NOERR)
     {
         result = describe(reader);
         if (result == RF_OK && (size_t)moment >= reader->moments)
-            result = rf_fail(RF_BAD_INPUT, source->path, NULL, "has %zu moments now: it changed while it was read",
+            result = rf_fail(RF_BAD_INPUT, source.path, NULL, "has %zu moments now: it changed while it was read",
                              reader->moments);
         if (result == RF_OK)
             result = take_moment(reader, moment, out);
