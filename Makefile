@@ -51,7 +51,7 @@ evaluate: setup-demo configure
 # Contact sheets of the real inputs ($$RIFFLE_DATA, else ../shared/data) and the built-in ones, in build/gallery.
 # "make gallery DOCS=1" also renews the pictures in docs/gallery, those of free inputs only; SHEETS="NAME..." picks some.
 gallery: setup-demo configure
-	@cmake --build $(BUILD) --target riffle contact_sheet
+	@cmake --build $(BUILD) --target riffle contact_sheet bench_synth
 	@bash cmake/gallery.sh $(BUILD) $(if $(DOCS),--docs) $(SHEETS)
 
 # The tables of options and built-in inputs in docs/, from the program.
