@@ -3,7 +3,7 @@
 BUILD := build
 FORMATTED = $(shell git ls-files '*.c' '*.h')
 
-.PHONY: all demo test bench curve rivals evaluate gallery docs format install clean setup-% configure
+.PHONY: all demo test bench curve rivals cost evaluate gallery docs format install clean setup-% configure
 
 all: setup-build configure
 	@cmake --build $(BUILD) --target riffle riffle_static riffle_shared
@@ -37,6 +37,12 @@ rivals: setup-test configure
 	@cmake --build $(BUILD) --target bench_quality
 	@bash bench/rivals.sh $(BUILD)/bench_quality
 
+# What a still costs by its size: renews the plot of docs/optimize.md. A minute, on a machine that does nothing else.
+cost: setup-build configure
+	@cmake --build $(BUILD) --target bench_cost
+	@mkdir -p docs/optimize
+	@$(BUILD)/bench_cost plot=docs/optimize/cost.svg
+
 # Every method on every pair of flow and exemplar, judged: renews the tables and pictures of docs/evaluation.md. 20 minutes.
 evaluate: setup-demo configure
 	@cmake --build $(BUILD) --target evaluation_run evaluation_page contact_sheet
@@ -45,7 +51,7 @@ evaluate: setup-demo configure
 # Contact sheets of the real inputs ($$RIFFLE_DATA, else ../shared/data) and the built-in ones, in build/gallery.
 # "make gallery DOCS=1" also renews the pictures in docs/gallery, those of free inputs only; SHEETS="NAME..." picks some.
 gallery: setup-demo configure
-	@cmake --build $(BUILD) --target riffle contact_sheet
+	@cmake --build $(BUILD) --target riffle contact_sheet bench_synth
 	@bash cmake/gallery.sh $(BUILD) $(if $(DOCS),--docs) $(SHEETS)
 
 # The tables of options and built-in inputs in docs/, from the program.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Still texture synthesis: how good, beside four other tools, and how fast?
 //
-//   bench_synth peers [runs=3] [seeds=1] [only=TEXT] [threads=N] [windows=17,9] [OPTION=VALUE ...]
+//   bench_synth peers [runs=3] [seeds=1] [only=TEXT] [threads=N] [windows=17,9] [out=FOLDER] [OPTION=VALUE ...]
 //   bench_synth speed [runs=3] [only=TEXT] [windows=17,9] [OPTION=VALUE ...]
 //
 // Without arguments both, the first only where its data are. OPTION is any of rf_optimize_still, choices by their
@@ -10,7 +10,7 @@
 // peers: 512 x 512 pixels from each exemplar of $RIFFLE_DATA/reference/peers, judged as its figures were. CSV:
 // exemplar,tool,residual,share,spectrum,verbatim,seconds (median of runs; of others as they are told, on as many
 // threads as they have). With seeds=N that for N seeds, `seed` being the first. Then, in lines with #, each program's
-// mean rank and who beats Riffle where.
+// mean rank and who beats Riffle where. The pictures go to FOLDER/EXEMPLAR.png (of N seeds those of the last), if said.
 //
 // speed: exemplars drawn by the program, 1 and 2 threads. CSV: exemplar,from,to,threads,ms (median of runs),runs,
 // ns a pixel. The machine may be shared, so compare figures of one run only.
@@ -30,7 +30,7 @@ enum
 typedef struct Settings
 {
     RfOptimizeOptions options;
-    const char *only;
+    const char *only, *out;
     int runs, seeds, threads;
 } Settings;
 
@@ -119,6 +119,8 @@ static void parse(int argc, char **argv, Settings *s)
             s->seeds = atoi(value);
         else if (value && strcmp(argv[i], "only") == 0)
             s->only = value;
+        else if (value && strcmp(argv[i], "out") == 0)
+            s->out = value;
         else if (value && strcmp(argv[i], "threads") == 0)
             s->threads = atoi(value);
         else if (value && strcmp(argv[i], "windows") == 0)
@@ -218,6 +220,23 @@ static void keep_named(PeerTable *table, const char *only)
     table->count = kept;
 }
 
+// Riffle's row, and its picture where that is wanted.
+static void run_own(const Settings *s, const RfOptimizeOptions *options, const char *name, PeerTable *table)
+{
+    PeerOwn own;
+    char path[1200];
+    require(peers_synthesise(table, name, options, s->runs, &own));
+    peers_add(table, &own.row);
+    print_row(&own.row, own.verbatim);
+    if (s->out)
+    {
+        snprintf(path, sizeof path, "%s/%s.png", s->out, name);
+        rf_image_set_origin(own.picture, RF_SAMPLE_U8, RF_ENCODING_SRGB);
+        require(rf_image_write(path, own.picture));
+    }
+    rf_image_destroy(own.picture);
+}
+
 static bool run_peers(const Settings *s)
 {
     static PeerTable others, table;
@@ -237,13 +256,9 @@ static bool run_peers(const Settings *s)
         {
             if (!is_first_of_its_name(&others, i))
                 continue;
-            PeerRow row;
-            double verbatim;
-            require(peers_synthesise(&others, others.rows[i].name, &options, s->runs, &row, &verbatim));
-            peers_add(&table, &row);
-            print_row(&row, verbatim);
+            run_own(s, &options, others.rows[i].name, &table);
             if (seed == 0)
-                print_others(&others, row.name);
+                print_others(&others, others.rows[i].name);
         }
         printf("# seed %llu\n", (unsigned long long)options.seed);
         print_summary(&table);
@@ -292,9 +307,8 @@ static double time_case(const Case *c, const Settings *s, int threads)
 static void run_speed(const Settings *s)
 {
     static const char *const exemplars[] = {"builtin:pebbles", "builtin:lava"};
-    // Three tasks, and a series from one exemplar: after the exemplar's own share the cost grows as the pixels.
-    static const int sizes[][2] = {{128, 512}, {64, 256},  {256, 1024}, {128, 128},
-                                   {128, 256}, {128, 768}, {128, 1024}, {128, 2048}};
+    // How the cost grows with the pixels: bench_cost.
+    static const int sizes[][2] = {{128, 512}, {64, 256}, {256, 1024}};
     printf("exemplar,from,to,threads,ms,runs,ns a pixel\n");
     for (size_t e = 0; e < sizeof exemplars / sizeof *exemplars; ++e)
         for (size_t i = 0; i < sizeof sizes / sizeof *sizes && strstr(exemplars[e], s->only); ++i)

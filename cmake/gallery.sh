@@ -5,7 +5,8 @@
 # Leaves one sheet a pair of flow and exemplar in BUILD/gallery: exemplar, flow, four frames. Real inputs are taken from
 # $RIFFLE_DATA (else ../shared/data); those that are absent are left out, with a line. With --docs the sheets marked
 # `free` are also put into docs/gallery as JPEG: made from inputs that the program draws itself, or whose licence is CC0,
-# MIT, BSD, ISC or Apache or that are in the public domain. With names only those sheets are made.
+# MIT, BSD, ISC or Apache or that are in the public domain. With names only those sheets are made. Stills beside other
+# tools' are sheets, too: peers-EXEMPLAR.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -29,12 +30,13 @@ present() {
     [[ $1 == builtin:* || -e $1 ]] || { echo "skipped: $2: $1 is not there"; return 1; }
 }
 
-# publish NAME: the sheet as a JPEG of at most $largest bytes.
+# publish NAME [WIDTH]: the sheet as a JPEG of at most $largest bytes, shrunk to WIDTH where it is wider.
 publish() {
-    local quality
+    local quality narrower=()
+    [ $# = 1 ] || narrower=(-vf "scale='min(iw,$2)':-2:flags=area")
     mkdir -p docs/gallery
     for quality in 3 5 8 12 18; do
-        ffmpeg -nostdin -loglevel error -y -i "$out/$1.png" -q:v "$quality" "docs/gallery/$1.jpg"
+        ffmpeg -nostdin -loglevel error -y -i "$out/$1.png" "${narrower[@]}" -q:v "$quality" "docs/gallery/$1.jpg"
         [ "$(stat -c %s "docs/gallery/$1.jpg")" -gt $largest ] || return 0
     done
     echo "gallery.sh: docs/gallery/$1.jpg is larger than $largest bytes" >&2
@@ -115,6 +117,40 @@ shapes() {
     [ "$docs" != --docs ] || publish shapes
 }
 
+# labelled FROM TO LINE1 [LINE2]: the picture below two lines of text.
+labelled() {
+    local font="font=Sans:fontcolor=0xe8e8e8:x=2:expansion=none" room="pad=iw:ih+56:0:56:color=0x1c1c1c"
+    ffmpeg -nostdin -loglevel error -y -i "$1" -frames:v 1 -pix_fmt rgb24 -vf \
+        "$room,drawtext=$font:fontsize=26:y=2:text='$3',drawtext=$font:fontsize=20:y=32:text='${4:-}'" "$2"
+}
+
+# peers free|other EXEMPLAR: the exemplar, Riffle's still and what other tools made of it, with their figures, all as
+# bench_synth judges them.
+peers() {
+    local licence=$1 exemplar=$2 name=peers-$2 cells=() folder tool residual share spectrum
+    local made=$data/reference/peers/$exemplar
+    wanted "$name" || return 0
+    present "$made/exemplar.png" "$name" || return 0
+    folder=$out/$name
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    echo "$name"
+    RIFFLE_DATA=$data "$build/bench_synth" peers runs=1 only="$exemplar" out="$folder" >"$folder/figures.csv"
+    labelled "$made/exemplar.png" "$folder/exemplar.cell.png" exemplar
+    cells=("$folder/exemplar.cell.png")
+    while IFS=, read -r _ tool residual share spectrum _; do
+        [ "$tool" = riffle ] || cp "$made/$tool.png" "$folder/$tool.png"
+        [ "$tool" != riffle ] || mv "$folder/$exemplar.png" "$folder/riffle.png"
+        labelled "$folder/$tool.png" "$folder/$tool.cell.png" "$tool" \
+            "residual $residual   share $share   spectrum $spectrum dB"
+        cells+=("$folder/$tool.cell.png")
+    done < <(grep "^$exemplar," "$folder/figures.csv")
+    "$build/examples/contact_sheet" "$out/$name.png" --columns 3 --cell 512 "${cells[@]}"
+    if [ "$docs" = --docs ] && [ "$licence" = free ]; then
+        publish "$name" 1080
+    fi
+}
+
 flows=$data/flows2d
 exemplars=$data/exemplars
 # Speeds of one to four pixels a frame; the moments spread over the frames drawn.
@@ -138,5 +174,9 @@ for flow in wind:gfs_wind piv:pivpy_day2 turbulence:example_data_HIT.nc; do
     sheet "$name-foam" free "$flows/${flow#*:}" builtin:foam 96 "${options[@]}"
     sheet "$name-grass" free "$flows/${flow#*:}" "$exemplars/skimage_grass.png" 96 "${options[@]}"
 done
+
+# Stills, each of 512 x 512 pixels from 128 x 128. Free: MIT and CC0, as is what other tools made of them.
+for exemplar in ps_nuts ps_reptil_skin wei_161 skimage_brick; do peers free "$exemplar"; done
+for exemplar in stk_lava stk_grass3 krita_18b_WaveFlex gimp_stone33; do peers other "$exemplar"; done
 
 echo "sheets: $out/*.png"

@@ -33,16 +33,16 @@ static int synthesise_all(void **state)
     int others = g_table.count;
     for (int i = 0; i < others; ++i)
     {
-        PeerRow row;
-        double verbatim;
+        PeerOwn own;
         if (peers_find(&g_table, g_table.rows[i].name, "riffle"))
             continue;
-        if (peers_synthesise(&g_table, g_table.rows[i].name, &options, 1, &row, &verbatim) != RF_OK)
-            return print_message("%s: %s\n", row.name, rf_last_error()->message), 1;
-        print_message("%-18s residual %6.2f  share %.3f  spectrum %.2f  verbatim %.3f  %.2f s\n", row.name,
-                      row.values[0], row.values[1], row.values[2], verbatim, row.seconds);
-        g_most_verbatim = verbatim > g_most_verbatim ? verbatim : g_most_verbatim;
-        peers_add(&g_table, &row);
+        if (peers_synthesise(&g_table, g_table.rows[i].name, &options, 1, &own) != RF_OK)
+            return print_message("%s: %s\n", g_table.rows[i].name, rf_last_error()->message), 1;
+        print_message("%-18s residual %6.2f  share %.3f  spectrum %.2f  verbatim %.3f  %.2f s\n", own.row.name,
+                      own.row.values[0], own.row.values[1], own.row.values[2], own.verbatim, own.row.seconds);
+        g_most_verbatim = own.verbatim > g_most_verbatim ? own.verbatim : g_most_verbatim;
+        peers_add(&g_table, &own.row);
+        rf_image_destroy(own.picture);
     }
     return 0;
 }

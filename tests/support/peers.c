@@ -183,33 +183,37 @@ static RfResult make_picture(const RfImageView *from, const RfOptimizeOptions *o
 }
 
 RfResult peers_synthesise(const PeerTable *table, const char *name, const RfOptimizeOptions *options, int runs,
-                          PeerRow *row, double *verbatim)
+                          PeerOwn *out)
 {
-    RfImage *exemplar = NULL, *made = NULL;
+    RfImage *exemplar = NULL;
     RfMeasureFrame m;
-    *row = (PeerRow){.tool = "riffle"};
-    snprintf(row->name, sizeof row->name, "%s", name);
+    *out = (PeerOwn){.row.tool = "riffle"};
+    snprintf(out->row.name, sizeof out->row.name, "%s", name);
     RfResult result = peers_image(table, name, "exemplar", &exemplar);
     RfImageView from, picture;
     if (result == RF_OK)
     {
         from = rf_image_view(exemplar);
-        result = make_picture(&from, options, runs, &made, &row->seconds);
+        result = make_picture(&from, options, runs, &out->picture, &out->row.seconds);
     }
     if (result == RF_OK)
     {
-        picture = rf_image_view(made);
+        picture = rf_image_view(out->picture);
         result = peers_judge(&from, &picture, &m);
     }
     if (result == RF_OK)
     {
-        row->values[0] = m.patch.residual;
-        row->values[1] = m.patch.share;
-        row->values[2] = m.spectrum.distance;
-        *verbatim = peers_verbatim(&from, &picture);
+        out->row.values[0] = m.patch.residual;
+        out->row.values[1] = m.patch.share;
+        out->row.values[2] = m.spectrum.distance;
+        out->verbatim = peers_verbatim(&from, &picture);
+    }
+    else
+    {
+        rf_image_destroy(out->picture);
+        out->picture = NULL;
     }
     rf_image_destroy(exemplar);
-    rf_image_destroy(made);
     return result;
 }
 

@@ -44,10 +44,18 @@ RF_MUST_USE RfResult peers_judge(const RfImageView *exemplar, const RfImageView 
 /// rms.
 double peers_verbatim(const RfImageView *exemplar, const RfImageView *picture);
 
-/// Riffle's own 512 x 512 pixels from the named exemplar, the row and the part that is verbatim. The time is the
-/// median of `runs`.
+/// What Riffle made, the part of it that is verbatim, and the picture.
+typedef struct PeerOwn
+{
+    PeerRow row;
+    double verbatim;
+    RfImage *picture;
+} PeerOwn;
+
+/// Riffle's own 512 x 512 pixels from the named exemplar. The time is the median of `runs`. The caller destroys the
+/// picture; on failure there is none.
 RF_MUST_USE RfResult peers_synthesise(const PeerTable *table, const char *name, const RfOptimizeOptions *options,
-                                      int runs, PeerRow *row, double *verbatim);
+                                      int runs, PeerOwn *out);
 
 /// Appends; there must be room.
 void peers_add(PeerTable *table, const PeerRow *row);
