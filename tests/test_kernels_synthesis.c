@@ -68,7 +68,6 @@ static void every_cost_is_that_of_its_match_and_the_energy_is_their_mean(void **
                                                                      .frame = &f,
                                                                      .side = SIDE,
                                                                      .windows = exact ? windows : NULL,
-                                                                     .keep = 1,
                                                                      .plain = true,
                                                                      .all = true});
             for (int i = 0; i < window_count(&f); ++i)
@@ -102,7 +101,6 @@ static void the_exact_search_finds_what_a_slow_one_finds(void **state)
                                         .side = SIDE,
                                         .windows = windows,
                                         .prices = priced ? prices : NULL,
-                                        .keep = 1,
                                         .plain = true,
                                         .all = true});
         for (int i = 0; i < window_count(&f); i += TEST_SANITIZED ? 7 : 2)
@@ -152,7 +150,7 @@ static void the_exact_search_is_that_of_all_windows(void **state)
         RfWindowQueries asked = {.count = count, .windows = queries};
         assert_int_equal(rf_windows_search(windows, &asked, matches), RF_OK);
         search_with((RfSynthesisSearch){
-            .exemplar = &e, .frame = &f, .side = SIDE, .windows = windows, .keep = 1, .plain = true, .all = true});
+            .exemplar = &e, .frame = &f, .side = SIDE, .windows = windows, .plain = true, .all = true});
         for (int i = 0; i < count; ++i)
         {
             RfVec2 match = match_of(&f, &f.windows[i]);
@@ -176,7 +174,7 @@ static void k_coherent_candidates_are_never_better_than_all(void **state)
         RfSynthesisExemplar e = make_exemplar(60, 52, CHANNELS, tiles, 5);
         RfSynthesisFrame f = make_muddle(&e, 64, 50, tiles, SIDE, 6);
         RfWindowDatabase *windows = all_windows(&e, SIDE);
-        RfSynthesisSearch search = {.exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .plain = true, .all = true};
+        RfSynthesisSearch search = {.exemplar = &e, .frame = &f, .side = SIDE, .plain = true, .all = true};
         double coherent_energy, exact_energy;
         RfSynthesisWindow *coherent = windows_after(&f, search, &coherent_energy);
         search.windows = windows;
@@ -204,7 +202,7 @@ static void a_search_without_prices_never_makes_a_window_dearer(void **state)
     (void)state;
     RfSynthesisExemplar e = make_exemplar(50, 50, CHANNELS, false, 5);
     RfSynthesisFrame f = make_muddle(&e, 60, 60, false, SIDE, 6);
-    RfSynthesisSearch search = {.exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .plain = true, .all = true};
+    RfSynthesisSearch search = {.exemplar = &e, .frame = &f, .side = SIDE, .plain = true, .all = true};
     double before = search_with(search);
     RfSynthesisWindow *windows = malloc((size_t)window_count(&f) * sizeof *windows);
     for (search.round = 1; search.round < 5; ++search.round)
@@ -226,35 +224,6 @@ static void a_search_without_prices_never_makes_a_window_dearer(void **state)
 }
 
 // Its own match stays unless another costs less than that part of it.
-static void what_a_window_has_it_keeps_unless_another_is_better_by_the_margin(void **state)
-{
-    (void)state;
-    RfSynthesisExemplar e = make_exemplar(50, 50, CHANNELS, false, 5);
-    RfSynthesisFrame f = make_muddle(&e, 60, 60, false, SIDE, 6);
-    RfSynthesisSearch search = {.exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .plain = true, .all = true};
-    double unused;
-    int kept = 0, left = 0;
-    RfSynthesisWindow *best = windows_after(&f, search, &unused);
-    search.keep = 0.6f;
-    RfSynthesisWindow *some = windows_after(&f, search, &unused);
-    for (int i = 0; i < window_count(&f); ++i)
-    {
-        RfVec2 at = compared_at(&f, &f.windows[i]), own = match_of(&f, &f.windows[i]);
-        // A scattered window's own match lies inside.
-        own = (RfVec2){rf_clamp(own.x, SIDE / 2, 50 - 1 - SIDE / 2), rf_clamp(own.y, SIDE / 2, 50 - 1 - SIDE / 2)};
-        float own_cost = slow_cost(&e, &f, at, own);
-        bool better = best[i].cost < 0.6f * own_cost;
-        assert_true(some[i].cost == (better ? best[i].cost : own_cost));
-        kept += !better;
-        left += better;
-    }
-    assert_true(kept > 10 && left > 10);
-    free(best);
-    free(some);
-    rf_synthesis_frame_free(&f);
-    rf_synthesis_exemplar_free(&e);
-}
-
 // ---- pieces
 
 static void check_piece(const RfSynthesisExemplar *e, RfSynthesisFrame *f, const RfVec2 *sources)
@@ -280,14 +249,8 @@ static void keep_as_it_is(const RfSynthesisExemplar *e, const RfWindowDatabase *
     memcpy(sources, f.sources, (size_t)pixels * sizeof *sources);
     for (uint64_t round = 0; round < 2; ++round)
     {
-        double energy = search_with((RfSynthesisSearch){.exemplar = e,
-                                                        .frame = &f,
-                                                        .side = SIDE,
-                                                        .windows = windows,
-                                                        .keep = 1,
-                                                        .plain = true,
-                                                        .all = true,
-                                                        .round = round});
+        double energy = search_with((RfSynthesisSearch){
+            .exemplar = e, .frame = &f, .side = SIDE, .windows = windows, .plain = true, .all = true, .round = round});
         assert_true(energy == 0);
         assign_with(
             (RfSynthesisAssign){.exemplar = e, .frame = &f, .side = SIDE, .mean = mean, .robust = robust, .all = true});
@@ -328,8 +291,8 @@ static void a_window_that_has_lost_its_place_is_told_it_by_its_pixels(void **sta
         // Neither the window nor its middle pixel.
         f.sources[(int)w->at.y * 36 + (int)w->at.x] = w->source = (RfVec2){5, 5};
     }
-    double energy = search_with(
-        (RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .plain = true, .all = true});
+    double energy =
+        search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .plain = true, .all = true});
     assert_true(energy == 0);
     for (int i = 0; i < window_count(&f); ++i)
         assert_true(f.windows[i].source.x == f.windows[i].at.x + 2 && f.windows[i].source.y == f.windows[i].at.y + 1);
@@ -360,15 +323,14 @@ static void a_turned_piece_is_found_by_windows_that_are_turned_alike(void **stat
     rf_synthesis_show(&f, &e, 0);
     assert_true(same_pixel(&f, 3, 5, shown_at(&e, N - 1 - 5, 3)));
     rf_synthesis_place(&f, turns);
-    assert_true(search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .all = true}) ==
-                0);
+    assert_true(search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .all = true}) == 0);
     assign_with((RfSynthesisAssign){.exemplar = &e, .frame = &f, .side = SIDE, .together = 0.75f, .all = true});
     for (int i = 0; i < N * N; ++i)
         assert_true(same_pixel(&f, i % N, i / N, shown_at(&e, (float)(N - 1 - i / N), (float)(i % N))));
     // Windows that do not know of it find nothing like it.
     rf_synthesis_place(&f, NULL);
-    assert_true(search_with((RfSynthesisSearch){
-                    .exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .plain = true, .all = true}) > 1000);
+    assert_true(
+        search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .plain = true, .all = true}) > 1000);
     rf_synthesis_frame_free(&f);
     rf_synthesis_exemplar_free(&e);
 }
@@ -379,7 +341,7 @@ static void only_what_is_stirred_is_searched_and_only_what_has_changed_is_made(v
     (void)state;
     RfSynthesisExemplar e = make_exemplar(44, 39, CHANNELS, false, 5);
     RfSynthesisFrame f = make_piece(&e, 36, 36, false, 2, 1, 4);
-    RfSynthesisSearch search = {.exemplar = &e, .frame = &f, .side = SIDE, .keep = 1, .plain = true};
+    RfSynthesisSearch search = {.exemplar = &e, .frame = &f, .side = SIDE, .plain = true};
     memset(f.stirred, 0, (size_t)window_count(&f));
     f.windows[0].source.x += 3;
     f.windows[80].source.x += 3;
@@ -459,7 +421,6 @@ int main(void)
         cmocka_unit_test(the_exact_search_is_that_of_all_windows),
         cmocka_unit_test(k_coherent_candidates_are_never_better_than_all),
         cmocka_unit_test(a_search_without_prices_never_makes_a_window_dearer),
-        cmocka_unit_test(what_a_window_has_it_keeps_unless_another_is_better_by_the_margin),
         cmocka_unit_test(a_piece_of_the_exemplar_is_a_fixed_point),
         cmocka_unit_test(a_window_that_has_lost_its_place_is_told_it_by_its_pixels),
         cmocka_unit_test(a_turned_piece_is_found_by_windows_that_are_turned_alike),

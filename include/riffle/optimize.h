@@ -17,6 +17,8 @@ typedef enum RfOptimizeForm
 
 typedef enum RfOptimizeOrient
 {
+    /// The exemplar lies as it is, and is turned as the flow turns it.
+    RF_ORIENT_FREE,
     /// The exemplar lies everywhere as it is.
     RF_ORIENT_NONE,
     /// The exemplar's x axis points downstream.
@@ -56,7 +58,7 @@ typedef struct RfOptimizeOptions
     /// Price of using one place of the exemplar more than others, against the mean cost of a window, 0 to 100. Default
     /// 2. 0 lets the result collapse to the places that fit themselves best.
     float spread;
-    /// Of moving textures; stills have RfOptimizeConstraints.orientation. Default RF_ORIENT_NONE.
+    /// Of moving textures; stills have RfOptimizeConstraints.orientation. Default RF_ORIENT_FREE.
     RfOptimizeOrient orient;
     /// Of stills, and of the first frame of moving textures; later ones are k-coherent. Default RF_SEARCH_COHERENCE.
     RfOptimizeSearch search;
@@ -109,8 +111,10 @@ RF_API RF_MUST_USE RfResult rf_optimize_advance(RfOptimize *optimize, const RfFl
 /// What the last step did. Times are seconds of this step.
 typedef struct RfOptimizeStats
 {
-    int windows;
-    /// The rms difference of windows to their matches, in parts of the exemplar's range.
+    /// Pieces of the exemplar laid over worn texture.
+    int patches;
+    /// The rms difference of these to what they were laid on, on the coarse level of the search, in parts of the
+    /// exemplar's range; of the last ones laid.
     double energy;
     double carry_seconds, search_seconds, draw_seconds;
 } RfOptimizeStats;

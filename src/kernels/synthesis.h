@@ -53,7 +53,7 @@ typedef struct RfSynthesisFrame
     bool tiles;
     int spacing, columns, rows;
     RfSynthesisWindow *windows;
-    /// Of cells: a pixel became another in the last assignment, or see RfSynthesisAssign.carried.
+    /// Of cells: a pixel became another in the last assignment.
     uint8_t *stirred;
     /// [height][width]: where each pixel comes from in the exemplar.
     RfVec2 *sources;
@@ -117,8 +117,6 @@ typedef struct RfSynthesisSearch
     const RfWindowDatabase *windows;
     /// [height][width] of the exemplar, for a window's centre, added to its cost; NULL: none.
     const float *prices;
-    /// A window keeps its match unless another costs less than this part of it. 1: the best always.
-    float keep;
     /// Whole pixels only, and nothing turned: the fast path.
     bool plain;
     /// Windows where nothing has changed too.
@@ -143,15 +141,10 @@ typedef struct RfSynthesisAssign
     int side;
     /// A pixel becomes the mean of what its windows say, not one of them.
     bool mean;
-    /// A pixel becomes what most windows say, not what is nearest to their mean: no detail is lost where windows are at
-    /// odds about where it lies.
-    bool strongest;
     /// Windows that fit badly count less (energy with r = 0.8; else r = 2).
     bool robust;
     /// Offsets that differ by up to this, in exemplar pixels, are one: their mean is taken. 0 for still pictures.
     float together;
-    /// Cells are stirred where their windows are at odds, not where a pixel became another: all of a carried frame do.
-    bool carried;
     /// Cells where nothing has changed too.
     bool all;
     /// Channels at the end of the picture that are given, not made.

@@ -176,15 +176,6 @@ static void mean_of_votes(const Assigning *a, Ballot *b, int x, int y, float tot
         mean[c] = (mean[c] + hold * held[c]) / (1 + hold);
 }
 
-static int strongest_group(const Ballot *b)
-{
-    int best = -1;
-    for (int g = 0; g < b->groups; ++g)
-        if (b->weight[g] > 0 && (best < 0 || b->weight[g] > b->weight[best]))
-            best = g;
-    return best;
-}
-
 static int nearest_group(const Assigning *a, const Ballot *b, const float *mean)
 {
     float least = INFINITY;
@@ -231,7 +222,7 @@ static bool assign_pixel(const Assigning *a, Ballot *b, int x, int y)
     float mean[RF_MAX_EXEMPLAR_CHANNELS];
     mean_of_votes(a, b, x, y, total, mean);
     int16_t *pixel = rf_fixed_at(&assign->frame->picture, x, y);
-    int best = assign->strongest ? strongest_group(b) : nearest_group(a, b, mean);
+    int best = nearest_group(a, b, mean);
     bool other =
         set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], snap(a, place_of(b, best)));
     for (int c = 0; c < a->channels && (assign->mean || assign->held); ++c)
@@ -326,7 +317,7 @@ static void assign_row(void *context, int row, int worker)
                     for (int x = x0; x < x1; ++x)
                         other |= assign_pixel(a, b, x, y);
         }
-        f->stirred[(ptrdiff_t)row * f->columns + i] = assign->carried ? b->groups > 1 : other;
+        f->stirred[(ptrdiff_t)row * f->columns + i] = other;
     }
 }
 

@@ -210,10 +210,8 @@ static bool is_stirred(const RfSynthesisFrame *f, int column, int row, int reach
     return false;
 }
 
-// Of two, the best; of an own match and another, the own unless the other is better by the margin.
 static void search_window(const Walk *walk, RfSynthesisWindow *window, int index, Scratch *scratch)
 {
-    const RfSynthesisSearch *s = walk->search;
     Candidates *c = &scratch->candidates;
     RfVec2 at = compared_at(walk, window);
     add(walk, c, rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at))));
@@ -221,20 +219,8 @@ static void search_window(const Walk *walk, RfSynthesisWindow *window, int index
     add_similar(walk, c);
     add_random(walk, c, index);
     RfFixedQuery query = query_of(walk, window, at, scratch);
-    float cost = 0, own = 0;
-    int best = 0;
-    if (s->keep < 1)
-    {
-        rf_fixed_least(&query, c->corners, NULL, 1, &own);
-        best = 1 + rf_fixed_least(&query, c->corners + 1, c->prices + 1, c->count - 1, &cost);
-        if (c->count == 1 || cost + c->prices[best] >= s->keep * (own + c->prices[0]))
-        {
-            best = 0;
-            cost = own;
-        }
-    }
-    else
-        best = rf_fixed_least(&query, c->corners, c->prices, c->count, &cost);
+    float cost = 0;
+    int best = rf_fixed_least(&query, c->corners, c->prices, c->count, &cost);
     settle(window, at, c->places[best], cost);
     forget(c);
 }
@@ -302,8 +288,12 @@ static RfResult search_batch(Walk *walk, int count, const float *penalties, RfWi
     for (int i = 0; i < count; ++i)
     {
         RfSynthesisWindow *window = &walk->search->frame->windows[walk->list[walk->first + i]];
-        RfVec2 place = {(float)(matches[i].place.x + walk->half), (float)(matches[i].place.y + walk->half)};
-        settle(window, compared_at(walk, window), place, matches[i].distance * unit);
+        RfVec2 at = compared_at(walk, window);
+        RfVec2 own = rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at)));
+        // The picture shows whole pixels of the exemplar where its sources lie between them.
+        RfVec2 place = {(float)(matches[i].place.x + walk->half) + own.x - (float)whole(own.x),
+                        (float)(matches[i].place.y + walk->half) + own.y - (float)whole(own.y)};
+        settle(window, at, place, matches[i].distance * unit);
         walk->sums[0][0] += (double)window->cost;
         walk->sums[0][1] += (double)window->cost;
         walk->sums[0][2] += 1;

@@ -3,23 +3,19 @@
 //
 // Kwatra, Essa, Bobick, Kwatra. Texture optimization for example-based synthesis. 2005 (section 5, flow-guided
 // synthesis). Kwatra, Adalsteinsson, Kim, Kwatra, Carlson, Lin. Texturing fluids. 2007 (coordinates carried in place of
-// colours, the soft constraint by gradient).
+// colours, orientation carried and turned by the flow).
 //
-// The windows themselves travel. Each keeps its place in the exemplar, as a real number, and moves with the flow at its
-// centre, so that what it shows is never stretched and never interpolated twice. Where the flow deforms, neighbouring
-// windows come to disagree: there, and only there, they are searched again.
+// The first frame is a still texture. Then, frame by frame:
 //
-//     carry    windows move; a cell that lost its window gets a new one that continues its nearest neighbour
-//     draw     c: every pixel as the carried windows say
-//     search   windows over pixels where windows disagree; one keeps its match unless another is a tenth better
-//     draw     again, held to c where c has gradients
+//     carry    markers, each with its place in the exemplar, move with the flow, which turns and strains what is seen
+//     judge    where the texture is stretched too much, or comes from beyond the exemplar, it is worn
+//     renew    patches of the exemplar that fit what is there best are laid over worn places (renewing.c)
+//     draw     every pixel from the markers round it, and from what fades
 //
-// Deviations. A contested pixel becomes what most windows over it say, not what is nearest to their mean as in a still:
-// where windows disagree about where a thin line lies, the mean is nearly its ground, and within 60 frames of a vortex
-// lava goes dark (contrast 0.65 of the exemplar's; by the most votes 0.9). Kwatra et al. carry colours and hold all
-// pixels to them; carried colours blur, and are wrong by half a pixel where they are not interpolated. Windows whose
-// places differ by less than a pixel are not at odds: their mean is drawn, so that a weak strain bends the texture
-// smoothly before it breaks.
+// Deviations. Kwatra et al. match small windows everywhere in every frame, held to the carried picture. Here what is
+// sound is left alone, so that it follows the flow exactly and does not flicker, and what is worn is replaced by pieces
+// larger than what they are to keep whole; why, renewing.c tells. New texture fades in over some frames where it is
+// unlike what it replaces.
 #include "methods/optimize/moving.h"
 #include "core/clock.h"
 #include "core/maths.h"
@@ -27,19 +23,19 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/result.h"
-#include "kernels/nearest_known.h"
-#include "kernels/tracing.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-// A window is given another match where that costs less than this part of its own.
-static const float KEEP = 0.9f;
-// Offsets that differ by less, in exemplar pixels, are one.
-static const float TOGETHER = 1.0f;
-// How strongly pixels are held to the carried ones, where their gradient is large, against a weight of 1 of all
-// windows.
-static const float HOLD = 1.0f;
+enum
+{
+    /// Exemplars are searched on the first level that has no longer sides than this, but not on the finest, unless it
+    /// is the only one.
+    SEARCHED_SIDE = 128,
+    MAX_PATCHES = 4096
+};
+
+// Of a patch's reach, so much is laid in every direction.
+static const float CORE = 0.4f;
 
 RfResult rf_optimize_create(const RfExemplar *exemplar, const RfOptimizeOptions *options, RfOptimize **out)
 {
@@ -58,17 +54,33 @@ RfResult rf_optimize_create(const RfExemplar *exemplar, const RfOptimizeOptions 
     return RF_OK;
 }
 
+// Everything that depends on the first frame.
+static void clear(RfOptimize *o)
+{
+    rf_synthesis_material_free(&o->material);
+    rf_markers_free(&o->markers);
+    rf_markers_free(&o->fading);
+    rf_windows_destroy(o->windows);
+    rf_release(o->wear);
+    rf_release(o->turns);
+    rf_release(o->smoothed);
+    rf_release(o->detail);
+    rf_release(o->penalties);
+    rf_release(o->prices);
+    rf_release(o->patches);
+    rf_release(o->worn);
+    rf_release(o->taken);
+    rf_release(o->queries);
+    rf_release(o->matches);
+    rf_release(o->scratch);
+    *o = (RfOptimize){.options = o->options, .exemplar = o->exemplar};
+}
+
 void rf_optimize_destroy(RfOptimize *o)
 {
     if (!o)
         return;
-    rf_synthesis_material_free(&o->start.material);
-    rf_synthesis_frame_free(&o->start.frame);
-    rf_release(o->next);
-    rf_fixed_free(&o->held);
-    rf_release(o->hold);
-    rf_release(o->prices);
-    rf_release(o->nearest);
+    clear(o);
     rf_release(o);
 }
 
@@ -76,7 +88,7 @@ void rf_optimize_destroy(RfOptimize *o)
 
 // How a picture's texture lies in the flow at a point of the frame: the exemplar's x axis points downstream. (1, 0)
 // where the flow stands still.
-static RfVec2 flow_turn(const RfFlowView *flow, int width, int height, RfVec2 at)
+RfVec2 rf_optimize_downstream(const RfFlowView *flow, int width, int height, RfVec2 at)
 {
     RfVec2 v = rf_flow_sample(flow, (at.x + 0.5f) * (float)flow->width / (float)width,
                               (at.y + 0.5f) * (float)flow->height / (float)height, rf_flow_blend(flow, flow->time));
@@ -85,7 +97,7 @@ static RfVec2 flow_turn(const RfFlowView *flow, int width, int height, RfVec2 at
     return length > 1e-6f ? (RfVec2){v.x / length, -v.y / length} : (RfVec2){1, 0};
 }
 
-static RfResult start_turned(RfOptimize *o, const RfFlowView *flow, int width, int height)
+static RfResult start_turned(const RfOptimize *o, const RfFlowView *flow, int width, int height, RfOptimizeStart *start)
 {
     float *degrees = rf_allocate((size_t)width * (size_t)height, sizeof *degrees);
     if (!degrees)
@@ -93,268 +105,168 @@ static RfResult start_turned(RfOptimize *o, const RfFlowView *flow, int width, i
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
         {
-            RfVec2 turn = flow_turn(flow, width, height, (RfVec2){(float)x, (float)y});
+            RfVec2 turn = rf_optimize_downstream(flow, width, height, (RfVec2){(float)x, (float)y});
             degrees[(ptrdiff_t)y * width + x] = atan2f(-turn.y, turn.x) * (180 / RF_PI);
         }
     RfOptimizeConstraints constraints = {.orientation = {degrees, width, height, 1, width}};
-    RfResult result = rf_optimize_start(o->exemplar, &o->options, &constraints, width, height, &o->start);
+    RfResult result = rf_optimize_start(o->exemplar, &o->options, &constraints, width, height, start);
     rf_release(degrees);
     return result;
 }
 
-static int by_size(const void *a, const void *b)
+// How much a window varies: the sum of squared differences from its mean, in all channels.
+static float variation_of(const float *window, int pixels, int channels)
 {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-static float gradient_at(const RfFixedPicture *picture, int x, int y, int channels)
-{
-    int left = rf_max_int(x - 1, 0), right = rf_min_int(x + 1, picture->width - 1);
-    int above = rf_max_int(y - 1, 0), below = rf_min_int(y + 1, picture->height - 1);
-    const int16_t *w = rf_fixed_at(picture, left, y), *e = rf_fixed_at(picture, right, y);
-    const int16_t *n = rf_fixed_at(picture, x, above), *s = rf_fixed_at(picture, x, below);
-    float sum = 0;
+    double all = 0;
     for (int c = 0; c < channels; ++c)
     {
-        float dx = 0.5f * (float)(e[c] - w[c]), dy = 0.5f * (float)(s[c] - n[c]);
-        sum += dx * dx + dy * dy;
+        double sum = 0, squares = 0;
+        for (int i = 0; i < pixels; ++i)
+        {
+            double value = (double)window[(ptrdiff_t)i * channels + c];
+            sum += value;
+            squares += value * value;
+        }
+        all += squares - sum * sum / pixels;
     }
-    return sqrtf(sum);
+    return (float)all;
 }
 
-static RfResult measure_gradient(RfOptimize *o)
+static RfResult open_exemplar(RfOptimize *o)
 {
-    const RfFixedPicture *picture = &o->start.material.levels[0].fixed;
-    int count = 0;
-    float *all = rf_allocate((size_t)picture->width * (size_t)picture->height, sizeof *all);
-    if (!all)
-        return RF_OUT_OF_MEMORY;
-    for (int y = 0; y < picture->height; ++y)
-        for (int x = 0; x < picture->width; ++x)
-            all[count++] = gradient_at(picture, x, y, picture->channels);
-    qsort(all, (size_t)count, sizeof *all, by_size);
-    o->gradient = rf_max(all[(size_t)count * 95 / 100], 1);
-    rf_release(all);
-    return RF_OK;
-}
-
-RfResult rf_optimize_make_room(RfOptimize *o)
-{
-    RfSynthesisFrame *f = &o->start.frame;
-    const RfSynthesisExemplar *e = &o->start.material.levels[0];
-    RF_TRY(rf_synthesis_cut(f, rf_max_int(o->start.side / 4, 1)));
-    RF_TRY(rf_fixed_create(f->width, f->height, e->channels, 0, &o->held));
-    o->next = rf_allocate((size_t)f->columns * (size_t)f->rows, sizeof *o->next);
-    o->hold = rf_allocate((size_t)f->width * (size_t)f->height, sizeof *o->hold);
+    const RfSynthesisMaterial *m = &o->material;
+    int reach = o->options.windows[0], wanted = 1;
+    while (o->level + 1 < m->level_count &&
+           (o->level == 0 || rf_max_int(m->levels[o->level].width, m->levels[o->level].height) > SEARCHED_SIDE))
+        ++o->level;
+    do
+    {
+        wanted = (2 * reach >> o->level) | 1;
+        wanted = rf_clamp_int(wanted, 5, RF_FIXED_SIDE);
+        o->side = rf_synthesis_side(m, o->level, wanted, RF_MAX_SIZE, RF_MAX_SIZE);
+    } while (o->side == 0 && o->level-- > 0);
+    if (o->side == 0)
+        return rf_fail(RF_BAD_INPUT, NULL, NULL, "an exemplar of %d x %d pixels is too small", m->levels[0].width,
+                       m->levels[0].height);
+    o->outer = rf_clamp_int((o->side << o->level) / 2, 2, rf_min_int(reach, RF_RING_RADII - 1));
+    o->inner = rf_max_int((int)(CORE * (float)o->outer), 1);
+    const RfSynthesisExemplar *e = &m->levels[o->level];
+    RfWindowSource source = {.image = {e->pixels, e->width, e->height, e->channels, (ptrdiff_t)e->width * e->channels}};
+    RfWindowOptions options = {.side = o->side, .tiles = e->tiles};
+    RF_TRY(rf_windows_create(&source, 1, &options, &o->windows));
+    size_t count = (size_t)rf_windows_count(o->windows);
+    o->detail = rf_allocate(count, sizeof *o->detail);
+    o->penalties = rf_allocate(count, sizeof *o->penalties);
     o->prices = rf_allocate((size_t)e->width * (size_t)e->height, sizeof *o->prices);
-    o->nearest = rf_allocate((size_t)f->columns * (size_t)f->rows, sizeof *o->nearest);
-    if (!o->next || !o->hold || !o->prices || !o->nearest)
-        return RF_OUT_OF_MEMORY;
-    return measure_gradient(o);
+    float *window = rf_allocate((size_t)rf_windows_numbers(o->windows), sizeof *window);
+    bool enough = o->detail && o->penalties && o->prices && window;
+    for (size_t i = 0; i < count && enough; ++i)
+    {
+        rf_windows_read(o->windows, (int)i, window);
+        o->detail[i] = variation_of(window, o->side * o->side, e->channels);
+    }
+    rf_release(window);
+    return enough ? RF_OK : RF_OUT_OF_MEMORY;
+}
+
+RfResult rf_optimize_make_room(RfOptimize *o, int width, int height)
+{
+    RF_TRY(rf_markers_create(width, height, o->options.tile, &o->markers));
+    RF_TRY(rf_markers_create(width, height, o->options.tile, &o->fading));
+    RF_TRY(open_exemplar(o));
+    o->columns = (width + RF_WEAR_GRAIN - 1) / RF_WEAR_GRAIN;
+    o->rows = (height + RF_WEAR_GRAIN - 1) / RF_WEAR_GRAIN;
+    size_t cells = (size_t)o->columns * (size_t)o->rows;
+    int64_t area = (int64_t)o->outer * o->outer * 2;
+    o->max_patches =
+        (int)((int64_t)width * height / area < MAX_PATCHES ? (int64_t)width * height / area + 1 : MAX_PATCHES);
+    size_t patches = (size_t)o->max_patches;
+    o->wear = rf_allocate(cells, sizeof *o->wear);
+    o->turns = rf_allocate(cells, sizeof *o->turns);
+    o->smoothed = rf_allocate(cells, sizeof *o->smoothed);
+    o->worn = rf_allocate(cells, sizeof *o->worn);
+    o->taken = rf_allocate(cells, 1);
+    o->patches = rf_allocate(patches, sizeof *o->patches);
+    o->queries = rf_allocate(patches * (size_t)rf_windows_numbers(o->windows), sizeof *o->queries);
+    o->matches = rf_allocate(patches, sizeof *o->matches);
+    o->scratch = rf_allocate(RF_MAX_THREADS, sizeof *o->scratch);
+    bool enough = o->wear && o->turns && o->smoothed && o->worn && o->taken && o->patches && o->queries && o->matches &&
+                  o->scratch;
+    return enough ? RF_OK : RF_OUT_OF_MEMORY;
+}
+
+static void set_markers(RfOptimize *o, const RfFlowView *flow, const RfSynthesisFrame *frame)
+{
+    RfMarkers *m = &o->markers;
+    for (int i = 0; i < m->width * m->height; ++i)
+    {
+        RfVec2 at = {(float)(i % m->width), (float)(i / m->width)}, turn = {1, 0};
+        if (o->options.orient == RF_ORIENT_FLOW)
+            turn = rf_optimize_downstream(flow, m->width, m->height, at);
+        m->pixels[i] = (RfMarker){at, frame->sources[i], rf_bend_of(turn), 1};
+    }
 }
 
 static RfResult begin(RfOptimize *o, const RfFlowView *flow, int width, int height)
 {
-    if (o->options.orient == RF_ORIENT_FLOW)
-        RF_TRY(start_turned(o, flow, width, height));
-    else
-        RF_TRY(rf_optimize_start(o->exemplar, &o->options, NULL, width, height, &o->start));
-    RF_TRY(rf_optimize_make_room(o));
-    rf_synthesis_place(&o->start.frame, NULL);
-    for (int i = 0; i < o->start.frame.columns * o->start.frame.rows && o->options.orient == RF_ORIENT_FLOW; ++i)
-        o->start.frame.windows[i].turn = flow_turn(flow, width, height, o->start.frame.windows[i].at);
-    o->placed = true;
-    return RF_OK;
+    RfOptimizeStart start = {0};
+    RF_TRY(o->options.orient == RF_ORIENT_FLOW
+               ? start_turned(o, flow, width, height, &start)
+               : rf_optimize_start(o->exemplar, &o->options, NULL, width, height, &start));
+    o->material = start.material;
+    RfResult result = rf_optimize_make_room(o, width, height);
+    if (result == RF_OK)
+        set_markers(o, flow, &start.frame);
+    rf_synthesis_frame_free(&start.frame);
+    o->placed = result == RF_OK;
+    if (!o->placed)
+        clear(o);
+    return result;
 }
 
-// ---- carry
-
-typedef struct Carrying
-{
-    RfOptimize *o;
-    const RfFlowView *flow;
-    int steps;
-} Carrying;
-
-// Into -0.5 to n - 0.5.
-static float wrap(float at, int n)
-{
-    return at - floorf((at + 0.5f) / (float)n) * (float)n;
-}
-
-static void carry_row(void *context, int row, int worker)
-{
-    (void)worker;
-    const Carrying *k = context;
-    RfSynthesisFrame *f = &k->o->start.frame;
-    float scale_x = (float)k->flow->width / (float)f->width, scale_y = (float)k->flow->height / (float)f->height;
-    for (int i = 0; i < f->columns; ++i)
-    {
-        RfSynthesisWindow *w = &f->windows[(ptrdiff_t)row * f->columns + i];
-        RfVec2 p = {(w->at.x + 0.5f) * scale_x, (w->at.y + 0.5f) * scale_y};
-        p = rf_trace(k->flow, p, k->o->time, k->flow->time, k->steps);
-        w->at = (RfVec2){p.x / scale_x - 0.5f, p.y / scale_y - 0.5f};
-        if (f->tiles)
-            w->at = (RfVec2){wrap(w->at.x, f->width), wrap(w->at.y, f->height)};
-        if (k->o->options.orient == RF_ORIENT_FLOW)
-            w->turn = flow_turn(k->flow, f->width, f->height, w->at);
-    }
-}
-
-// The cell of a point, -1 outside the frame.
-static int cell_of(const RfSynthesisFrame *f, RfVec2 at)
-{
-    if (!(at.x >= -0.5f && at.y >= -0.5f && at.x < (float)f->width - 0.5f && at.y < (float)f->height - 0.5f))
-        return -1;
-    int column = rf_min_int((int)(at.x + 0.5f) / f->spacing, f->columns - 1);
-    int row = rf_min_int((int)(at.y + 0.5f) / f->spacing, f->rows - 1);
-    return row * f->columns + column;
-}
-
-// One window a cell: of two that meet the one that fits better stays.
-static void put_into_cells(RfOptimize *o)
-{
-    RfSynthesisFrame *f = &o->start.frame;
-    int cells = f->columns * f->rows;
-    memset(o->next, 0, (size_t)cells * sizeof *o->next);
-    for (int i = 0; i < cells; ++i)
-    {
-        RfSynthesisWindow *w = &f->windows[i];
-        int cell = cell_of(f, w->at);
-        if (cell < 0 || (o->next[cell].exists && o->next[cell].cost <= w->cost))
-            continue;
-        o->next[cell] = *w;
-        o->next[cell].changed = false;
-    }
-    RfSynthesisWindow *swap = f->windows;
-    f->windows = o->next;
-    o->next = swap;
-}
-
-// Empty cells get a window that continues the nearest carried one: sound texture from the first, if not the best. Where
-// the flow swept all windows out, the texture stays as it is.
-static void fill_cells(RfOptimize *o)
-{
-    RfSynthesisFrame *f = &o->start.frame;
-    int cells = f->columns * f->rows;
-    for (int i = 0; i < cells; ++i)
-        o->nearest[i] = f->windows[i].exists ? i : -1;
-    rf_spread_nearest(o->nearest, f->columns, f->rows);
-    if (o->nearest[0] < 0)
-        rf_synthesis_place(f, NULL);
-    for (int i = 0; i < cells; ++i)
-    {
-        if (o->nearest[i] < 0 || o->nearest[i] == i)
-            continue;
-        const RfSynthesisWindow *from = &f->windows[o->nearest[i]];
-        RfVec2 at = rf_synthesis_cell_middle(f, i % f->columns, i / f->columns);
-        f->windows[i] = *from;
-        f->windows[i].at = at;
-        f->windows[i].source = rf_vec2_add(from->source, rf_turn(from->turn, rf_vec2_sub(at, from->at)));
-        f->windows[i].changed = true; // not carried
-    }
-}
-
-static void carry(RfOptimize *o, const RfFlowView *flow)
-{
-    Carrying carrying = {o, flow, rf_path_steps(flow, flow->time - o->time)};
-    rf_parallel_for(o->start.frame.rows, carry_row, &carrying);
-    put_into_cells(o);
-    fill_cells(o);
-}
-
-// ---- mend
-
-static RfResult draw_windows(RfOptimize *o, bool held)
-{
-    RfSynthesisAssign assign = {
-        .exemplar = &o->start.material.levels[0],
-        .frame = &o->start.frame,
-        .side = o->start.side,
-        .mean = o->options.form == RF_FORM_MEAN,
-        .strongest = true,
-        .robust = true,
-        .together = TOGETHER,
-        .carried = true,
-        .all = !held,
-        .held = held ? &o->held : NULL,
-        .hold = o->hold,
-    };
-    return rf_synthesis_assign(&assign);
-}
-
-static void hold_row(void *context, int y, int worker)
-{
-    (void)worker;
-    RfOptimize *o = context;
-    RfSynthesisFrame *f = &o->start.frame;
-    for (int x = 0; x < f->width; ++x)
-    {
-        const RfSynthesisWindow *w = &f->windows[(ptrdiff_t)(y / f->spacing) * f->columns + x / f->spacing];
-        float gradient = gradient_at(&f->picture, x, y, f->picture.channels);
-        // What is new has nothing to be held to.
-        o->hold[(ptrdiff_t)y * f->width + x] = w->changed ? 0 : HOLD * rf_min(1, gradient / o->gradient);
-    }
-    memcpy(rf_fixed_at(&o->held, 0, y), rf_fixed_at(&f->picture, 0, y),
-           (size_t)f->width * (size_t)f->picture.channels * sizeof(int16_t));
-}
-
-static RfResult mend(RfOptimize *o)
-{
-    RfSynthesisFrame *f = &o->start.frame;
-    const RfSynthesisExemplar *e = &o->start.material.levels[0];
-    rf_synthesis_settle_prices(f, e, o->start.side, &o->start.usage);
-    rf_synthesis_prices(e, o->start.side, &o->start.usage, o->options.spread * (float)o->energy.compared, o->prices);
-    rf_parallel_for(f->height, hold_row, o);
-    RfSynthesisSearch search = {
-        .exemplar = e,
-        .frame = f,
-        .side = o->start.side,
-        .prices = o->options.spread > 0 ? o->prices : NULL,
-        .keep = KEEP,
-        .plain = o->options.orient == RF_ORIENT_NONE,
-        .seed = o->options.seed,
-        .round = ++o->round + 1000000,
-    };
-    return rf_synthesis_search(&search, &o->energy);
-}
+// ---- a step
 
 static RfResult check_step(const RfOptimize *o, const RfFlowView *flow, int width, int height)
 {
     RF_REQUIRE(width >= 8 && width <= RF_MAX_SIZE && height >= 8 && height <= RF_MAX_SIZE,
                "frame: %d x %d: each side must be 8 to %d", width, height, RF_MAX_SIZE);
     RF_TRY(rf_flow_view_check(flow));
-    const RfSynthesisFrame *f = &o->start.frame;
-    RF_REQUIRE(!o->placed || (width == f->width && height == f->height),
-               "frame: %d x %d after frames of %d x %d: the size must stay", width, height, f->width, f->height);
+    const RfMarkers *m = &o->markers;
+    RF_REQUIRE(!o->placed || (width == m->width && height == m->height),
+               "frame: %d x %d after frames of %d x %d: the size must stay", width, height, m->width, m->height);
     RF_REQUIRE(!o->placed || flow->time >= o->time, "flow: time %g after %g: times must not decrease", flow->time,
                o->time);
     return RF_OK;
+}
+
+static void carry(RfOptimize *o, const RfFlowView *flow)
+{
+    rf_markers_carry(&o->markers, flow, o->time);
+    rf_markers_fill(&o->markers);
+    rf_markers_carry(&o->fading, flow, o->time);
+    float faded = (float)(flow->time - o->time) / RF_FADING_FRAMES;
+    for (int i = 0; i < o->fading.width * o->fading.height; ++i)
+        o->fading.pixels[i].share = rf_max(o->fading.pixels[i].share - faded, 0);
 }
 
 RfResult rf_optimize_advance(RfOptimize *o, const RfFlowView *flow, int width, int height)
 {
     RF_REQUIRE(o && flow, "rf_optimize_advance: optimize or flow is NULL");
     RF_TRY(check_step(o, flow, width, height));
+    double start = rf_seconds(), carried = start;
     if (!o->placed)
         RF_TRY(begin(o, flow, width, height));
     else if (flow->time > o->time)
     {
         RF_TRY(rf_progress("carrying", 0)); // at the door: a step, once begun, is ended
-        double start = rf_seconds(), carried, drawn, searched;
         carry(o, flow);
         carried = rf_seconds();
-        RF_TRY(draw_windows(o, false));
-        drawn = rf_seconds();
-        RF_TRY(mend(o));
-        searched = rf_seconds();
-        RF_TRY(draw_windows(o, true));
-        o->seconds[0] = carried - start;
-        o->seconds[1] = searched - drawn;
-        o->seconds[2] = drawn - carried + rf_seconds() - searched;
+        RF_TRY(rf_optimize_renew(o, flow));
     }
     o->time = flow->time;
+    o->seconds[0] = carried - start;
+    o->seconds[1] = rf_seconds() - carried;
+    o->seconds[2] = 0;
     return RF_OK;
 }
 
@@ -363,27 +275,58 @@ typedef struct Drawing
     const RfOptimize *o;
     const RfFlowView *flow;
     const RfImageView *frame;
+    /// The exemplar has maps of directions, which turn.
+    bool directions;
 } Drawing;
+
+// Absurd flows carry places so far that their indices would be none.
+static RfVec2 within_reach(RfVec2 place)
+{
+    return (RfVec2){rf_clamp(place.x, -1e6f, 1e6f), rf_clamp(place.y, -1e6f, 1e6f)};
+}
+
+// The mean of what all voices say. False: nobody says anything.
+static bool draw_pixel(const Drawing *d, const RfMarkers *m, int x, int y, float *values)
+{
+    RfVoices voices;
+    rf_markers_hear(m, x, y, &voices);
+    if (voices.count == 0)
+        return false;
+    RfVec2 lies, *turn = NULL;
+    if (d->directions)
+    {
+        lies = rf_bend_parts(m->pixels[(ptrdiff_t)y * m->width + x].bend).turn;
+        turn = &lies;
+    }
+    rf_optimize_sample(&d->o->material, within_reach(voices.places[0]), turn, NULL, values);
+    for (int c = 0; c < d->frame->channels && voices.count > 1; ++c)
+        values[c] *= voices.shares[0];
+    for (int g = 1; g < voices.count; ++g)
+    {
+        float other[RF_MAX_EXEMPLAR_CHANNELS];
+        rf_optimize_sample(&d->o->material, within_reach(voices.places[g]), turn, NULL, other);
+        for (int c = 0; c < d->frame->channels; ++c)
+            values[c] += voices.shares[g] * other[c];
+    }
+    return true;
+}
 
 static void draw_row(void *context, int y, int worker)
 {
     (void)worker;
     const Drawing *d = context;
-    const RfSynthesisFrame *f = &d->o->start.frame;
-    const RfFlowView *flow = d->flow;
-    bool turned = d->o->options.orient == RF_ORIENT_FLOW;
-    for (int x = 0; x < f->width; ++x)
+    const RfMarkers *m = &d->o->markers;
+    for (int x = 0; x < m->width; ++x)
     {
         float *values = d->frame->pixels + y * d->frame->row_stride + (ptrdiff_t)x * d->frame->channels;
-        if (flow->mask && !rf_pixel_inside(flow, f->width, f->height, x, y))
-        {
-            memset(values, 0, (size_t)d->frame->channels * sizeof *values);
+        float share = d->o->fading.pixels[(ptrdiff_t)y * m->width + x].share, other[RF_MAX_EXEMPLAR_CHANNELS];
+        memset(values, 0, (size_t)d->frame->channels * sizeof *values);
+        if (d->flow->mask && !rf_pixel_inside(d->flow, m->width, m->height, x, y))
             continue;
-        }
-        RfVec2 turn = turned ? flow_turn(flow, f->width, f->height, (RfVec2){(float)x, (float)y}) : (RfVec2){1, 0};
-        const int16_t *mean = d->o->options.form == RF_FORM_MEAN ? rf_fixed_at(&f->picture, x, y) : NULL;
-        rf_optimize_sample(&d->o->start.material, f->sources[(ptrdiff_t)y * f->width + x], turned ? &turn : NULL, mean,
-                           values);
+        draw_pixel(d, m, x, y, values);
+        if (share > 0 && draw_pixel(d, &d->o->fading, x, y, other))
+            for (int c = 0; c < d->frame->channels; ++c)
+                values[c] += share * (other[c] - values[c]);
     }
 }
 
@@ -394,9 +337,11 @@ RfResult rf_optimize_step(RfOptimize *o, const RfFlowView *flow, const RfImageVi
                frame->channels, rf_optimize_channels(o->exemplar));
     RF_TRY(rf_optimize_advance(o, flow, frame->width, frame->height));
     double start = rf_seconds();
-    Drawing drawing = {o, flow, frame};
+    Drawing drawing = {o, flow, frame, false};
+    for (int i = 0; i < o->exemplar->map_count; ++i)
+        drawing.directions |= o->exemplar->maps[i].kind == RF_MAP_VECTOR || o->exemplar->maps[i].kind == RF_MAP_NORMAL;
     rf_parallel_for(frame->height, draw_row, &drawing);
-    o->seconds[2] += rf_seconds() - start;
+    o->seconds[2] = rf_seconds() - start;
     return RF_OK;
 }
 
@@ -405,12 +350,9 @@ RfOptimizeStats rf_optimize_stats(const RfOptimize *o)
     RfOptimizeStats stats = {0};
     if (!o || !o->placed)
         return stats;
-    const RfSynthesisFrame *f = &o->start.frame;
-    for (int i = 0; i < f->columns * f->rows; ++i)
-        stats.windows += f->windows[i].exists;
-    double numbers = (double)o->start.side * o->start.side * o->start.material.channels;
-    double unit = (double)o->start.material.levels[0].scale * (double)o->start.material.widest;
-    stats.energy = sqrt(o->energy.mean / numbers) / unit;
+    double numbers = (double)o->side * o->side * o->material.channels;
+    stats.patches = o->laid;
+    stats.energy = sqrt(o->distance / numbers) / (double)o->material.widest;
     stats.carry_seconds = o->seconds[0];
     stats.search_seconds = o->seconds[1];
     stats.draw_seconds = o->seconds[2];

@@ -12,9 +12,6 @@ typedef struct RfOptimizeStart
 {
     RfSynthesisMaterial material;
     RfSynthesisFrame frame;
-    RfUsage usage;
-    /// Of the last windows.
-    int side;
 } RfOptimizeStart;
 
 RfResult rf_optimize_start(const RfExemplar *exemplar, const RfOptimizeOptions *options,

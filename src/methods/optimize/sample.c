@@ -32,16 +32,24 @@ static bool sample_all(const RfExemplar *e, RfVec2 source, float *values)
     }
     cubic_weights(u, wx);
     cubic_weights(v, wy);
-    memset(values, 0, (size_t)e->channels * sizeof *values);
-    for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i)
+    // Offsets of the columns and rows, brought inside.
+    ptrdiff_t columns[4], rows[4];
+    for (int i = 0; i < 4; ++i)
+    {
+        columns[i] = (ptrdiff_t)index_of(e, x + i - 1, e->width) * e->channels;
+        rows[i] = (ptrdiff_t)index_of(e, y + i - 1, e->height) * e->width * e->channels;
+    }
+    for (int c = 0; c < e->channels; ++c)
+    {
+        float sum = 0;
+        for (int j = 0; j < 4; ++j)
         {
-            const float *pixel = e->pixels + ((ptrdiff_t)index_of(e, y + j - 1, e->height) * e->width +
-                                              index_of(e, x + i - 1, e->width)) *
-                                                 e->channels;
-            for (int c = 0; c < e->channels; ++c)
-                values[c] += wy[j] * wx[i] * pixel[c];
+            const float *row = e->pixels + rows[j] + c;
+            sum += wy[j] * (wx[0] * row[columns[0]] + wx[1] * row[columns[1]] + wx[2] * row[columns[2]] +
+                            wx[3] * row[columns[3]]);
         }
+        values[c] = sum;
+    }
     return true;
 }
 

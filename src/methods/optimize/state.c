@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Saved states of a moving texture: a header, the windows, the pixels' sources.
+// Saved states of a moving texture: a header, the markers of all pixels, those that fade.
 #include "core/hash.h"
 #include "core/maths.h"
 #include "core/memory.h"
@@ -12,8 +12,7 @@
 
 enum
 {
-    STATE_VERSION = 1,
-    WINDOW_FLOATS = 8
+    STATE_VERSION = 2
 };
 
 typedef struct StateHeader
@@ -22,10 +21,8 @@ typedef struct StateHeader
     uint32_t version, simd;
     /// Of exemplar and options; and of the whole block with this field 0.
     uint64_t inputs, content;
-    int32_t width, height, side, placed;
-    double time, mean, compared;
-    uint64_t round;
-    RfUsage usage;
+    int32_t width, height, placed, fading;
+    double time, distance;
 } StateHeader;
 
 static const char g_magic[8] = "rf-opti";
@@ -43,35 +40,40 @@ static uint64_t content_hash(StateHeader header, const void *rest, size_t size)
     return rf_hash_bytes(rest, size, rf_hash_bytes(&header, sizeof header, 0));
 }
 
-static size_t rest_size(int width, int height, int spacing)
+/// A marker as it is saved. Those that fade are told by their pixel.
+typedef struct Record
 {
-    size_t columns = (size_t)((width + spacing - 1) / spacing), rows = (size_t)((height + spacing - 1) / spacing);
-    return columns * rows * WINDOW_FLOATS * sizeof(float) + (size_t)width * (size_t)height * sizeof(RfVec2);
+    RfVec2 at, source;
+    RfBend bend;
+    float share;
+    int32_t pixel;
+} Record;
+
+static size_t rest_size(int width, int height, int fading)
+{
+    return ((size_t)width * (size_t)height + (size_t)fading) * sizeof(Record);
 }
 
-static void write_windows(const RfSynthesisFrame *f, float *out)
+static Record *write_markers(const RfMarkers *m, Record *out)
 {
-    for (int i = 0; i < f->columns * f->rows; ++i, out += WINDOW_FLOATS)
-    {
-        const RfSynthesisWindow *w = &f->windows[i];
-        float values[WINDOW_FLOATS] = {w->at.x,   w->at.y,   w->source.x, w->source.y,
-                                       w->turn.x, w->turn.y, w->cost,     w->exists ? 1.0f : 0.0f};
-        memcpy(out, values, sizeof values);
-    }
+    for (int i = 0; i < m->width * m->height; ++i)
+        if (m->pixels[i].share > 0)
+            *out++ = (Record){m->pixels[i].at, m->pixels[i].source, m->pixels[i].bend, m->pixels[i].share, i};
+    return out;
 }
 
-static void read_windows(const float *in, RfSynthesisFrame *f)
+static int count_markers(const RfMarkers *m)
 {
-    for (int i = 0; i < f->columns * f->rows; ++i, in += WINDOW_FLOATS)
-        f->windows[i] = (RfSynthesisWindow){
-            .at = {in[0], in[1]}, .source = {in[2], in[3]}, .turn = {in[4], in[5]}, .cost = in[6], .exists = in[7] > 0};
+    int count = 0;
+    for (int i = 0; i < m->width * m->height; ++i)
+        count += m->pixels[i].share > 0;
+    return count;
 }
 
 RfResult rf_optimize_save(const RfOptimize *o, void **block, size_t *size)
 {
     RF_REQUIRE(o && block && size, "rf_optimize_save: optimize, block or size is NULL");
     *block = NULL;
-    const RfSynthesisFrame *f = &o->start.frame;
     StateHeader header;
     memset(&header, 0, sizeof header);
     memcpy(header.magic, g_magic, sizeof header.magic);
@@ -79,24 +81,17 @@ RfResult rf_optimize_save(const RfOptimize *o, void **block, size_t *size)
     header.simd = (uint32_t)rf_simd_level();
     header.inputs = inputs_hash(o->exemplar, &o->options);
     header.placed = o->placed;
-    header.width = f->width;
-    header.height = f->height;
-    header.side = o->start.side;
+    header.width = o->markers.width;
+    header.height = o->markers.height;
+    header.fading = count_markers(&o->fading);
     header.time = o->time;
-    header.mean = o->energy.mean;
-    header.compared = o->energy.compared;
-    header.round = o->round;
-    header.usage = o->start.usage;
-    size_t rest = o->placed ? rest_size(f->width, f->height, f->spacing) : 0;
+    header.distance = o->distance;
+    size_t rest = o->placed ? rest_size(header.width, header.height, header.fading) : 0;
     uint8_t *bytes = rf_allocate(sizeof header + rest, 1);
     if (!bytes)
         return RF_OUT_OF_MEMORY;
-    if (rest)
-    {
-        size_t sources = (size_t)f->width * (size_t)f->height * sizeof(RfVec2);
-        write_windows(f, (float *)(void *)(bytes + sizeof header));
-        memcpy(bytes + sizeof header + rest - sources, f->sources, sources);
-    }
+    if (o->placed)
+        write_markers(&o->fading, write_markers(&o->markers, (Record *)(void *)(bytes + sizeof header)));
     header.content = content_hash(header, bytes + sizeof header, rest);
     memcpy(bytes, &header, sizeof header);
     *block = bytes;
@@ -116,9 +111,9 @@ static RfResult check_state(const StateHeader *h, uint64_t inputs, const void *b
     if (h->inputs != inputs)
         return rf_fail(RF_BAD_INPUT, NULL, "header", "saved with another exemplar or other options: start again");
     bool sized = h->placed == 1 && h->width >= 8 && h->width <= RF_MAX_SIZE && h->height >= 8 &&
-                 h->height <= RF_MAX_SIZE && h->side >= 1 && h->side <= RF_FIXED_SIDE && isfinite(h->time);
+                 h->height <= RF_MAX_SIZE && h->fading >= 0 && h->fading <= h->width * h->height && isfinite(h->time);
     size_t rest = size - sizeof *h;
-    bool whole = sized ? rest == rest_size(h->width, h->height, rf_max_int(h->side / 4, 1)) : h->placed == 0 && !rest;
+    bool whole = sized ? rest == rest_size(h->width, h->height, h->fading) : h->placed == 0 && !rest;
     if (!whole || h->content != content_hash(*h, (const uint8_t *)block + sizeof *h, rest))
         return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
     return RF_OK;
@@ -126,23 +121,20 @@ static RfResult check_state(const StateHeader *h, uint64_t inputs, const void *b
 
 static RfResult restore(RfOptimize *o, const StateHeader *h, const uint8_t *rest, size_t size)
 {
-    RfSynthesisFrame *f = &o->start.frame;
-    RF_TRY(rf_synthesis_material_create(o->exemplar, o->options.levels, o->options.similar, &o->start.material));
-    RF_TRY(rf_synthesis_frame_create(h->width, h->height, o->start.material.channels, o->options.tile, f));
-    o->start.side = h->side;
-    o->start.usage = h->usage;
-    RF_TRY(rf_optimize_make_room(o));
-    size_t sources = (size_t)f->width * (size_t)f->height * sizeof(RfVec2);
-    float *windows = rf_allocate(size - sources, 1);
-    if (!windows)
-        return RF_OUT_OF_MEMORY;
-    memcpy(windows, rest, size - sources);
-    read_windows(windows, f);
-    rf_release(windows);
-    memcpy(f->sources, rest + size - sources, sources);
+    RF_TRY(rf_synthesis_material_create(o->exemplar, o->options.levels, o->options.similar, &o->material));
+    RF_TRY(rf_optimize_make_room(o, h->width, h->height));
+    size_t pixels = (size_t)h->width * (size_t)h->height;
+    for (size_t i = 0; i < size / sizeof(Record); ++i)
+    {
+        Record record;
+        memcpy(&record, rest + i * sizeof record, sizeof record);
+        RfMarkers *m = i < pixels ? &o->markers : &o->fading;
+        if (record.pixel < 0 || (size_t)record.pixel >= pixels)
+            return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
+        m->pixels[record.pixel] = (RfMarker){record.at, record.source, record.bend, record.share};
+    }
     o->time = h->time;
-    o->energy = (RfSynthesisEnergy){h->mean, h->compared};
-    o->round = h->round;
+    o->distance = h->distance;
     o->placed = true;
     return RF_OK;
 }

@@ -314,7 +314,6 @@ static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *en
         .side = s->side,
         .windows = s->windows,
         .prices = round > 0 && s->options->spread > 0 ? s->prices : NULL,
-        .keep = 1,
         .plain = !is_turned(s),
         .all = all,
         .seed = s->options->seed,
@@ -516,7 +515,7 @@ RfResult rf_optimize_start(const RfExemplar *exemplar, const RfOptimizeOptions *
 {
     Still *s;
     RF_TRY(make_still(exemplar, options, constraints, width, height, &s));
-    *out = (RfOptimizeStart){s->material, s->frame, s->usage, s->side};
+    *out = (RfOptimizeStart){s->material, s->frame};
     s->material = (RfSynthesisMaterial){0};
     s->frame = (RfSynthesisFrame){0};
     free_still(s);
