@@ -114,8 +114,9 @@ static int optimize_stages(const void *method, Stage stages[MAX_STAGES])
 static const Method g_methods[] = {
     METHOD(lagrangian, "textured grids that follow the flow, fade in and out and are blended: the spectrum stays",
            "default|paper", lagrangian_layers, lagrangian_stages),
-    METHOD(optimize, "windows of the exemplar that travel with the flow and are mended where they disagree", NULL, NULL,
-           optimize_stages),
+    METHOD(optimize,
+           "a still that the flow carries and bends, and pieces of the exemplar that fit where it is worn: shapes stay",
+           NULL, NULL, optimize_stages),
     METHOD(eulerian, "layers of carried coordinates, regenerated sooner where the flow deforms more", NULL, NULL, NULL),
     METHOD(dual, "two layers of carried coordinates that start afresh in turn", NULL, NULL, NULL),
     METHOD(sprites, "round pieces of the exemplar that the flow carries and does not bend", NULL, NULL, sprites_stages),

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Texture optimisation: a still texture of any size, or a moving one that is mended where the flow tears it.
+// Texture optimisation: a still texture of any size, or a moving one that keeps the exemplar's structure: it is carried
+// and bent by the flow, and renewed by pieces of the exemplar where it is worn.
 //
 // Kwatra, Essa, Bobick, Kwatra. Texture optimization for example-based synthesis. 2005. Han, Zhou, Wei, Gong, Bao,
 // Zhang, Guo. Fast example-based surface texture synthesis via discrete optimization. 2006.
@@ -53,14 +54,14 @@ typedef struct RfOptimizeOptions
     /// Search and assign steps with each window on the coarsest level, 1 to 100; half as many on each finer one.
     /// Default 6. More lower the energy, little after 6.
     int iterations;
-    /// Default RF_FORM_DISCRETE.
+    /// Of stills; moving textures show the exemplar's pixels. Default RF_FORM_DISCRETE.
     RfOptimizeForm form;
     /// Price of using one place of the exemplar more than others, against the mean cost of a window, 0 to 100. Default
     /// 2. 0 lets the result collapse to the places that fit themselves best.
     float spread;
     /// Of moving textures; stills have RfOptimizeConstraints.orientation. Default RF_ORIENT_FREE.
     RfOptimizeOrient orient;
-    /// Of stills, and of the first frame of moving textures; later ones are k-coherent. Default RF_SEARCH_COHERENCE.
+    /// Of stills, and of the first frame of moving textures. Default RF_SEARCH_COHERENCE.
     RfOptimizeSearch search;
     /// Similar places listed for every pixel of the exemplar, 1 to 8, as candidates of the k-coherent search.
     /// Default 2.
@@ -102,7 +103,7 @@ typedef struct RfOptimize RfOptimize;
 
 /// As the functions of the same names of RfLagrangian; an exemplar with a map named "guide" is RF_BAD_INPUT, and the
 /// first step may be cancelled, which leaves the stepper as it was. The first step makes a still texture; later ones
-/// carry it and mend it where the flow deforms it.
+/// carry and bend it, and lay pieces of the exemplar, of radius windows[0] pixels at most, over what is worn.
 RF_API RF_MUST_USE RfResult rf_optimize_create(const RfExemplar *exemplar, const RfOptimizeOptions *options,
                                                RfOptimize **out);
 RF_API RF_MUST_USE RfResult rf_optimize_step(RfOptimize *optimize, const RfFlowView *flow, const RfImageView *frame);

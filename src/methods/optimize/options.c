@@ -9,11 +9,13 @@ static const RfOption g_options[] = {
     {"levels", RF_OPTION_INT, offsetof(RfOptimizeOptions, levels), "", 0, RF_SYNTHESIS_LEVELS, 0, NULL,
      "Levels of the pyramid; 0 picks them by the exemplar's size. More keep larger structures together."},
     {"windows", RF_OPTION_INTS, offsetof(RfOptimizeOptions, windows), "px", 5, RF_FIXED_SIDE, 17, "17,9",
-     "Sides of the windows, odd, used one after the other on every level; large ones keep large structures together."},
+     "Sides of the windows, odd, used one after the other on every level; large ones keep large structures together. "
+     "In "
+     "moving textures the first is the radius of the pieces."},
     {"iterations", RF_OPTION_INT, offsetof(RfOptimizeOptions, iterations), "", 1, 100, 6, NULL,
      "Search and assign steps with each window on the coarsest level; half as many on each finer one."},
     {"form", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, form), "", 0, 1, RF_FORM_DISCRETE, "discrete|mean",
-     "A pixel becomes one of the exemplar's (sharp), or the mean of what its windows say (smooth)."},
+     "Of stills: a pixel becomes one of the exemplar's (sharp), or the mean of what its windows say (smooth)."},
     {"spread", RF_OPTION_FLOAT, offsetof(RfOptimizeOptions, spread), "", 0, 100, 2, NULL,
      "Price of using one place of the exemplar more than others; 0 lets the result collapse to what fits itself best."},
     {"orient", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, orient), "", 0, 2, RF_ORIENT_FREE, "free|none|flow",
