@@ -117,6 +117,28 @@ shapes() {
     [ "$docs" != --docs ] || publish shapes
 }
 
+# What optimize keeps: exemplar, frames 1, 100 and 200, and frame 200 of lagrangian, a row a material.
+kept() {
+    wanted kept || return 0
+    local folder=$out/kept cells=() pair flow exemplar name n
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    echo kept
+    for pair in "vortex $exemplars/ps_reptil_skin.pgm" "vortex $exemplars/skimage_brick.png" \
+        "turbulence builtin:pebbles" "turbulence builtin:lava"; do
+        read -r flow exemplar <<<"$pair"
+        present "$exemplar" kept || continue
+        name=$folder/$(basename "${exemplar#builtin:}")
+        "$riffle" texture "builtin:$flow?size=512x512" "$exemplar" "$name.%04d.png" --method optimize \
+            --frames 1-200 --progress none
+        "$riffle" texture "builtin:$flow?size=512x512" "$exemplar" "$name.lagrangian.%04d.png" --frames 1-200x199 \
+            --progress none
+        cells+=("$exemplar" "$name.0001.png" "$name.0100.png" "$name.0200.png" "$name.lagrangian.0200.png")
+    done
+    "$build/examples/contact_sheet" "$out/kept.png" --columns 5 --cell 320 "${cells[@]}"
+    [ "$docs" != --docs ] || publish kept
+}
+
 # labelled FROM TO LINE1 [LINE2]: the picture below two lines of text.
 labelled() {
     local font="font=Sans:fontcolor=0xe8e8e8:x=2:expansion=none" room="pad=iw:ih+56:0:56:color=0x1c1c1c"
@@ -165,6 +187,7 @@ sheet gyre-pebbles free "builtin:gyre?size=512x256" builtin:pebbles 96
 sheet eddies-bubbles free "builtin:turbulence?size=256x256&speed=1" builtin:bubbles 96 --size 512x512
 clouds
 shapes
+kept
 
 # Real flows: wind (public domain, ISC), particle image velocimetry (BSD), a slice of turbulence (MIT).
 for flow in wind:gfs_wind piv:pivpy_day2 turbulence:example_data_HIT.nc; do

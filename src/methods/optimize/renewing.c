@@ -31,6 +31,9 @@ enum
 // Part of its variance that a window's cost is lowered by. In a vortex the contrast of lava is 0.90, 0.97, 1.08 of the
 // exemplar's with 0, 0.5, 1.
 static const float DETAIL = 0.5f;
+// What a place used twice as much as the mean costs, against the last patches' mean distance, for each unit of `spread`
+// over rf_usage's step. With 1, bright pebbles crowd out the others; with 12 patches fit too badly.
+static const float PRICE = 4;
 
 static int index_in(float at, int n, bool tiles)
 {
@@ -269,7 +272,7 @@ static void set_penalties(RfOptimize *o)
                          rf_clamp(s.y, -1e6f, 1e6f));
         }
     rf_usage_settle(&usage);
-    rf_usage_prices(&usage, e->width, e->height, margin, o->options.spread * (float)o->distance, o->prices);
+    rf_usage_prices(&usage, e->width, e->height, margin, PRICE * o->options.spread * (float)o->distance, o->prices);
     for (int i = 0; i < rf_windows_count(o->windows); ++i)
     {
         RfWindowPlace place = rf_windows_place(o->windows, i);
