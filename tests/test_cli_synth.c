@@ -16,7 +16,8 @@
 
 enum
 {
-    NPY_HEADER = 128
+    NPY_HEADER = 128,
+    SEEDS = 4
 };
 
 // ---- pictures ----------------------------------------------------------------------------------------------------
@@ -97,6 +98,15 @@ static float roughness(const TestFolder *folder, const char *name)
     rf_exemplar_destroy(exemplar);
     rf_image_destroy(image);
     return value;
+}
+
+static float border_roughness(const TestFolder *folder, const char *exemplar, int seed, const char *tile)
+{
+    char line[256];
+    snprintf(line, sizeof line, "synth builtin:%s?size=96 a.png --exemplar-tiles no --size 150x110 --seed %d %s -y",
+             exemplar, seed, tile);
+    expect(folder, line, 0);
+    return roughness(folder, "a.png");
 }
 
 /// The structure tensor's main direction of change, in degrees from the x axis, clockwise (y points down), 0 to 180;
@@ -187,17 +197,18 @@ static void a_texture_that_tiles_continues_across_its_borders(void **state)
 {
     (void)state;
     TestFolder folder = test_folder_make();
+    // A border is one line of many, so that one picture tells little: canes that do not fit the size must break
+    // somewhere.
     static const char *const names[] = {"pebbles", "foam", "canes"};
     for (int i = 0; i < 3; ++i)
     {
-        char line[256];
-        snprintf(line, sizeof line, "synth builtin:%s?size=96 a.png --exemplar-tiles no --size 150x110 --tile -y",
-                 names[i]);
-        expect(&folder, line, 0);
-        snprintf(line, sizeof line, "synth builtin:%s?size=96 b.png --exemplar-tiles no --size 150x110 -y", names[i]);
-        expect(&folder, line, 0);
-        float tiled = roughness(&folder, "a.png"), free_border = roughness(&folder, "b.png");
-        if (!(tiled < 1.25f && free_border > 1.5f))
+        float tiled = 0, free_border = 0;
+        for (int seed = 1; seed <= SEEDS; ++seed)
+        {
+            tiled += border_roughness(&folder, names[i], seed, "--tile") / SEEDS;
+            free_border += border_roughness(&folder, names[i], seed, "") / SEEDS;
+        }
+        if (!(tiled < 1.4f && free_border > 2))
             fail_msg("%s: %g with --tile, %g without", names[i], (double)tiled, (double)free_border);
     }
     test_folder_remove(&folder);

@@ -70,6 +70,9 @@ RfWindowPlace rf_windows_place(const RfWindowDatabase *database, int candidate);
 int rf_windows_at(const RfWindowDatabase *database, RfWindowPlace place);
 /// Copies a candidate's pixels: [side][side][channels].
 void rf_windows_read(const RfWindowDatabase *database, int candidate, float *window);
+/// Fills variations[candidates]: the sum of squared differences of a candidate's pixels from their mean, in its first
+/// `channels` channels.
+void rf_windows_vary(const RfWindowDatabase *database, int channels, float *variations);
 
 typedef struct RfWindowQueries
 {

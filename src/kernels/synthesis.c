@@ -8,6 +8,10 @@
 
 #include <string.h>
 
+// Part of its variation that a window's cost is lowered by. Of 4 x 4 times cracked earth of 96 x 96 pixels 0, 0.5, 0.75
+// and 1 leave 0.23, 0.32, 0.93 and 0.94 of the contrast.
+static const float VARIATION_PART = 0.75f;
+
 RfResult rf_synthesis_exemplar_create(float *pixels, int width, int height, int channels, bool tiles, float scale,
                                       int similar, const RfSynthesisExemplar *coarse, RfSynthesisExemplar *out)
 {
@@ -157,4 +161,19 @@ void rf_synthesis_prices(const RfSynthesisExemplar *exemplar, int side, const Rf
                          float *prices)
 {
     rf_usage_prices(usage, exemplar->width, exemplar->height, margin_of(exemplar, side), scale, prices);
+}
+
+void rf_synthesis_penalties(const RfSynthesisExemplar *exemplar, const RfWindowDatabase *windows, int side,
+                            const float *prices, float unit, const float *variations, float *penalties)
+{
+    for (int i = 0; i < rf_windows_count(windows); ++i)
+    {
+        RfWindowPlace place = rf_windows_place(windows, i);
+        int x = place.x + side / 2, y = place.y + side / 2;
+        if (exemplar->tiles)
+            x = rf_wrap_int(x, exemplar->width), y = rf_wrap_int(y, exemplar->height);
+        penalties[i] = prices ? unit * prices[(ptrdiff_t)y * exemplar->width + x] : 0;
+        if (variations)
+            penalties[i] -= VARIATION_PART * variations[i];
+    }
 }

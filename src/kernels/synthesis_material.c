@@ -10,9 +10,8 @@
 enum
 {
     SMALLEST_SIDE = 5,
-    // Of the coarsest level, where there are at least three: it is halved from here on. With 48 the exact search there
-    // settles on what is smooth: lava and cracked earth lose 40 to 90 % of their contrast.
-    COARSEST_SIDE = 18,
+    // Of the coarsest level, where there are at least three: it is halved from here on.
+    COARSEST_SIDE = 33,
     LEAST_COARSEST_SIDE = 8
 };
 

@@ -262,21 +262,11 @@ static void gather_exact(void *context, int item, int worker)
         out[i] = scale * scratch->window[i];
 }
 
-// Prices are known by pixels, penalties by candidates: all whole windows, row by row.
-static float *make_penalties(const Walk *walk)
+static void set_penalties(const Walk *walk, float *penalties)
 {
-    const RfSynthesisExemplar *e = walk->search->exemplar;
-    float *penalties = rf_allocate((size_t)rf_windows_count(walk->search->windows), sizeof *penalties);
-    float unit = 1 / (e->scale * e->scale);
-    for (int i = 0; penalties && i < rf_windows_count(walk->search->windows); ++i)
-    {
-        RfWindowPlace place = rf_windows_place(walk->search->windows, i);
-        int x = place.x + walk->half, y = place.y + walk->half;
-        if (e->tiles)
-            x = rf_wrap_int(x, e->width), y = rf_wrap_int(y, e->height);
-        penalties[i] = unit * walk->search->prices[(ptrdiff_t)y * e->width + x];
-    }
-    return penalties;
+    const RfSynthesisSearch *s = walk->search;
+    float unit = 1 / (s->exemplar->scale * s->exemplar->scale);
+    rf_synthesis_penalties(s->exemplar, s->windows, s->side, s->prices, unit, s->variations, penalties);
 }
 
 static RfResult search_batch(Walk *walk, int count, const float *penalties, RfWindowMatch *matches)
@@ -306,10 +296,12 @@ static RfResult search_all(Walk *walk, int *list, int count, int batch)
     RfWindowMatch *matches = rf_allocate((size_t)batch, sizeof *matches);
     int numbers = rf_windows_numbers(walk->search->windows);
     walk->windows = rf_allocate((size_t)batch * (size_t)numbers, sizeof *walk->windows);
-    float *penalties = walk->search->prices ? make_penalties(walk) : NULL;
-    bool enough = matches && walk->windows && (penalties || !walk->search->prices);
+    float *penalties = rf_allocate((size_t)rf_windows_count(walk->search->windows), sizeof *penalties);
+    bool enough = matches && walk->windows && penalties;
     RfResult result = enough ? RF_OK : RF_OUT_OF_MEMORY;
     walk->list = list;
+    if (enough)
+        set_penalties(walk, penalties);
     for (walk->first = 0; walk->first < count && result == RF_OK; walk->first += batch)
         result = search_batch(walk, rf_min_int(batch, count - walk->first), penalties, matches);
     rf_release(matches);

@@ -22,6 +22,42 @@ void rf_windows_read(const RfWindowDatabase *d, int candidate, float *window)
         memcpy(window + (size_t)j * row, rows.numbers + j * rows.stride, row * sizeof *window);
 }
 
+typedef struct Variations
+{
+    const RfWindowDatabase *database;
+    int channels;
+    float *out;
+} Variations;
+
+static void vary(void *context, int candidate, int worker)
+{
+    (void)worker;
+    const Variations *v = context;
+    const RfWindowDatabase *d = v->database;
+    RfWindowRows rows = rf_window_rows(d, candidate);
+    double sums[RF_MAX_WINDOW_CHANNELS] = {0}, squares = 0;
+    for (int j = 0; j < d->side; ++j)
+    {
+        const float *row = rows.numbers + j * rows.stride;
+        for (int i = 0; i < d->side; ++i)
+            for (int c = 0; c < v->channels; ++c)
+            {
+                double value = (double)row[i * d->channels + c];
+                sums[c] += value;
+                squares += value * value;
+            }
+    }
+    for (int c = 0; c < v->channels; ++c)
+        squares -= sums[c] * sums[c] / (d->side * d->side);
+    v->out[candidate] = (float)squares;
+}
+
+void rf_windows_vary(const RfWindowDatabase *database, int channels, float *variations)
+{
+    Variations v = {database, channels, variations};
+    rf_parallel_for(database->candidates, vary, &v);
+}
+
 typedef struct Gathering
 {
     const RfWindowSource *source;

@@ -65,7 +65,7 @@ static void clear(RfOptimize *o)
     rf_release(o->wear);
     rf_release(o->turns);
     rf_release(o->smoothed);
-    rf_release(o->detail);
+    rf_release(o->variations);
     rf_release(o->penalties);
     rf_release(o->prices);
     rf_release(o->patches);
@@ -115,24 +115,6 @@ static RfResult start_turned(const RfOptimize *o, const RfFlowView *flow, int wi
     return result;
 }
 
-// How much a window varies: the sum of squared differences from its mean, in all channels.
-static float variation_of(const float *window, int pixels, int channels)
-{
-    double all = 0;
-    for (int c = 0; c < channels; ++c)
-    {
-        double sum = 0, squares = 0;
-        for (int i = 0; i < pixels; ++i)
-        {
-            double value = (double)window[(ptrdiff_t)i * channels + c];
-            sum += value;
-            squares += value * value;
-        }
-        all += squares - sum * sum / pixels;
-    }
-    return (float)all;
-}
-
 static RfResult open_exemplar(RfOptimize *o)
 {
     const RfSynthesisMaterial *m = &o->material;
@@ -156,18 +138,13 @@ static RfResult open_exemplar(RfOptimize *o)
     RfWindowOptions options = {.side = o->side, .tiles = e->tiles};
     RF_TRY(rf_windows_create(&source, 1, &options, &o->windows));
     size_t count = (size_t)rf_windows_count(o->windows);
-    o->detail = rf_allocate(count, sizeof *o->detail);
+    o->variations = rf_allocate(count, sizeof *o->variations);
     o->penalties = rf_allocate(count, sizeof *o->penalties);
     o->prices = rf_allocate((size_t)e->width * (size_t)e->height, sizeof *o->prices);
-    float *window = rf_allocate((size_t)rf_windows_numbers(o->windows), sizeof *window);
-    bool enough = o->detail && o->penalties && o->prices && window;
-    for (size_t i = 0; i < count && enough; ++i)
-    {
-        rf_windows_read(o->windows, (int)i, window);
-        o->detail[i] = variation_of(window, o->side * o->side, e->channels);
-    }
-    rf_release(window);
-    return enough ? RF_OK : RF_OUT_OF_MEMORY;
+    if (!o->variations || !o->penalties || !o->prices)
+        return RF_OUT_OF_MEMORY;
+    rf_windows_vary(o->windows, e->channels, o->variations);
+    return RF_OK;
 }
 
 RfResult rf_optimize_make_room(RfOptimize *o, int width, int height)

@@ -69,7 +69,7 @@ struct RfOptimize
     int level, side;
     RfWindowDatabase *windows;
     /// [windows]: how much each varies, and what is added to its cost.
-    float *detail, *penalties;
+    float *variations, *penalties;
     float *prices;
 
     int max_patches;

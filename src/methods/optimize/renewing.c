@@ -10,8 +10,7 @@
 // some times over; what is worn then waits for the next frame. A patch is large, and inside it the texture is the
 // exemplar's own: what is bad in its surroundings is not passed on. Small windows that are matched one by one pass it
 // on: within 30 frames of a vortex pebbles are shards, and lava is a dark field, since what is smooth is least unlike
-// to anything. Against that the cost of a window is lowered by a part of its own variance: for windows that have
-// nothing to do with each other the sum of squared differences is, in the mean, the sum of both variances.
+// to anything. Against that the cost of a window is lowered by a part of its own variation (rf_synthesis_penalties).
 #include "core/parallel.h"
 #include "core/result.h"
 #include "methods/optimize/moving.h"
@@ -28,9 +27,6 @@ enum
     SAMPLED = 4
 };
 
-// Part of its variance that a window's cost is lowered by. In a vortex the contrast of lava is 0.90, 0.97, 1.08 of the
-// exemplar's with 0, 0.5, 1.
-static const float DETAIL = 0.5f;
 // What a place used twice as much as the mean costs, against the last patches' mean distance, for each unit of `spread`
 // over rf_usage's step. With 1, bright pebbles crowd out the others; with 12 patches fit too badly.
 static const float PRICE = 4;
@@ -262,7 +258,7 @@ static void lay(RfOptimize *o, const RfPatch *p)
 static void set_penalties(RfOptimize *o)
 {
     const RfSynthesisExemplar *e = &o->material.levels[o->level], *finest = &o->material.levels[0];
-    int half = o->side / 2, margin = e->tiles ? 0 : half;
+    int margin = e->tiles ? 0 : o->side / 2;
     RfUsage usage = {0};
     for (int y = SAMPLED / 2; y < o->markers.height; y += SAMPLED)
         for (int x = SAMPLED / 2; x < o->markers.width; x += SAMPLED)
@@ -273,14 +269,7 @@ static void set_penalties(RfOptimize *o)
         }
     rf_usage_settle(&usage);
     rf_usage_prices(&usage, e->width, e->height, margin, PRICE * o->options.spread * (float)o->distance, o->prices);
-    for (int i = 0; i < rf_windows_count(o->windows); ++i)
-    {
-        RfWindowPlace place = rf_windows_place(o->windows, i);
-        int x = place.x + half, y = place.y + half;
-        if (e->tiles)
-            x = rf_wrap_int(x, e->width), y = rf_wrap_int(y, e->height);
-        o->penalties[i] = o->prices[(ptrdiff_t)y * e->width + x] - DETAIL * o->detail[i];
-    }
+    rf_synthesis_penalties(e, o->windows, o->side, o->prices, 1, o->variations, o->penalties);
 }
 
 static RfResult lay_patches(RfOptimize *o, int count)

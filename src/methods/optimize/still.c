@@ -59,6 +59,8 @@ typedef struct Still
     /// Of the windows at work.
     int level, side;
     RfWindowDatabase *windows;
+    /// Of windows, on the coarsest level; on others NULL.
+    float *variations;
     float *prices;
     float first_energy;
     /// In pixels searched.
@@ -293,12 +295,21 @@ static RfResult open_windows(Still *s)
     const RfSynthesisExemplar *e = &s->material.levels[s->level];
     rf_windows_destroy(s->windows);
     s->windows = NULL;
+    rf_release(s->variations);
+    s->variations = NULL;
     bool coarsest = s->level == s->material.level_count - 1;
     if (!coarsest && s->options->search != RF_SEARCH_EXACT)
         return RF_OK;
     RfWindowSource source = {.image = {e->pixels, e->width, e->height, e->channels, (ptrdiff_t)e->width * e->channels}};
     RfWindowOptions options = {.side = s->side, .tiles = e->tiles};
-    return rf_windows_create(&source, 1, &options, &s->windows);
+    RF_TRY(rf_windows_create(&source, 1, &options, &s->windows));
+    if (!coarsest)
+        return RF_OK;
+    s->variations = rf_allocate((size_t)rf_windows_count(s->windows), sizeof *s->variations);
+    if (!s->variations)
+        return RF_OUT_OF_MEMORY;
+    rf_windows_vary(s->windows, e->channels - s->material.guides, s->variations);
+    return RF_OK;
 }
 
 static bool is_turned(const Still *s)
@@ -313,6 +324,7 @@ static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *en
         .frame = &s->frame,
         .side = s->side,
         .windows = s->windows,
+        .variations = s->variations,
         .prices = round > 0 && s->options->spread > 0 ? s->prices : NULL,
         .plain = !is_turned(s),
         .all = all,
@@ -477,6 +489,7 @@ static void free_still(Still *s)
 {
     rf_synthesis_frame_free(&s->frame);
     rf_windows_destroy(s->windows);
+    rf_release(s->variations);
     rf_release(s->prices);
     for (int l = 0; l < RF_SYNTHESIS_LEVELS; ++l)
         free_bounds(&s->bounds[l]);
