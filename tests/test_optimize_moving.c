@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The moving form of texture optimisation.
+#include "core/hash.h"
 #include "kernels/nearest_known.h"
 #include "methods/optimize/moving.h"
 #include "riffle/riffle.h"
@@ -48,6 +49,16 @@ static void rotation(float *velocity, float radians)
             velocity[2 * (y * SIDE + x)] = -radians * ((float)y - 0.5f * (SIDE - 1));
             velocity[2 * (y * SIDE + x) + 1] = radians * ((float)x - 0.5f * (SIDE - 1));
         }
+}
+
+// Wears the texture out in two or three frames.
+static void shear(float *velocity)
+{
+    for (int i = 0; i < SIDE * SIDE; ++i)
+    {
+        velocity[2 * i] = 0.3f * ((float)(i / SIDE) - 0.5f * (SIDE - 1));
+        velocity[2 * i + 1] = 0;
+    }
 }
 
 static void step(RfOptimize *o, const float *velocity, const uint8_t *mask, int time, int channels, float *pixels)
@@ -109,7 +120,7 @@ static void the_bytes_do_not_depend_on_threads(void **state)
     (void)state;
     RfExemplar *exemplar = make_exemplar();
     static float velocity[2 * SIDE * SIDE], one[NUMBERS], many[NUMBERS];
-    rotation(velocity, 0.05f);
+    shear(velocity);
     static const int threads[] = {2, 3, 8};
     rf_set_threads(1);
     run(exemplar, velocity, FRAMES, one);
@@ -130,7 +141,7 @@ static void a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused(voi
     static float velocity[2 * SIDE * SIDE], whole[NUMBERS], resumed[NUMBERS];
     RfOptimizeOptions options = rf_optimize_defaults();
     options.iterations = 2;
-    rotation(velocity, 0.05f);
+    shear(velocity);
     for (int cut = 0; cut < FRAMES; ++cut)
     {
         int channels = channels_of(exemplar);
@@ -147,6 +158,7 @@ static void a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused(voi
             step(loaded, velocity, NULL, f, channels, resumed);
             assert_memory_equal(whole, resumed, (size_t)(SIDE * SIDE * channels) * sizeof *whole);
         }
+        assert_true(rf_optimize_stats(o).patches > 0);
         rf_optimize_destroy(loaded);
         ((uint8_t *)block)[size - 1] ^= 1;
         assert_int_equal(rf_optimize_load(exemplar, &options, block, size, &loaded), RF_BAD_INPUT);
@@ -158,6 +170,88 @@ static void a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused(voi
     rf_exemplar_destroy(exemplar);
 }
 
+enum
+{
+    // Bytes of a state's header and of a marker in it, and where numbers lie in them.
+    HEADER = 64,
+    CONTENT = 24,
+    TIME = 48,
+    DISTANCE = 56,
+    RECORD = 40,
+    AT = 0,
+    SOURCE = 12,
+    BEND = 16,
+    SHARE = 32,
+    PIXEL = 36
+};
+
+// As if it had been saved like this.
+static void sign(uint8_t *block, size_t size)
+{
+    uint64_t content = 0;
+    memcpy(block + CONTENT, &content, sizeof content);
+    content = rf_hash_bytes(block + HEADER, size - HEADER, rf_hash_bytes(block, HEADER, 0));
+    memcpy(block + CONTENT, &content, sizeof content);
+}
+
+static RfResult load_changed(const RfExemplar *exemplar, const uint8_t *block, size_t size, size_t offset,
+                             const void *value, size_t bytes)
+{
+    RfOptimizeOptions options = rf_optimize_defaults();
+    options.iterations = 2;
+    uint8_t *copy = malloc(size);
+    RfOptimize *loaded = NULL;
+    assert_non_null(copy);
+    memcpy(copy, block, size);
+    memcpy(copy + offset, value, bytes);
+    sign(copy, size);
+    RfResult result = rf_optimize_load(exemplar, &options, copy, size, &loaded);
+    rf_optimize_destroy(loaded);
+    free(copy);
+    return result;
+}
+
+static void a_state_with_a_true_hash_and_absurd_numbers_is_refused(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], pixels[NUMBERS];
+    RfOptimize *o = make(exemplar);
+    shear(velocity);
+    for (int f = 0; f < FRAMES; ++f)
+        step(o, velocity, NULL, f, channels_of(exemplar), pixels);
+    void *block = NULL;
+    size_t size = 0;
+    assert_int_equal(rf_optimize_save(o, &block, &size), RF_OK);
+    const size_t marker = HEADER + 100 * RECORD, fading = HEADER + (size_t)SIDE * SIDE * RECORD;
+    assert_true(size > fading);
+    assert_int_equal(load_changed(exemplar, block, size, marker + PIXEL, &(int32_t){100}, 4), RF_OK);
+    static const double doubles[] = {NAN, INFINITY, -INFINITY};
+    for (int i = 0; i < 3; ++i)
+    {
+        const float number = (float)doubles[i];
+        static const size_t places[] = {AT, SOURCE, BEND, SHARE};
+        assert_int_equal(load_changed(exemplar, block, size, TIME, &doubles[i], 8), RF_BAD_INPUT);
+        assert_int_equal(load_changed(exemplar, block, size, DISTANCE, &doubles[i], 8), RF_BAD_INPUT);
+        for (int k = 0; k < 4; ++k)
+        {
+            assert_int_equal(load_changed(exemplar, block, size, marker + places[k], &number, 4), RF_BAD_INPUT);
+            assert_int_equal(load_changed(exemplar, block, size, fading + places[k], &number, 4), RF_BAD_INPUT);
+        }
+    }
+    // Of a pixel that another marker lies in, nowhere, and seen not at all or more than that.
+    static const int32_t foreign[] = {99, -1, SIDE * SIDE};
+    for (int i = 0; i < 3; ++i)
+        assert_int_equal(load_changed(exemplar, block, size, marker + PIXEL, &foreign[i], 4), RF_BAD_INPUT);
+    assert_int_equal(load_changed(exemplar, block, size, marker + AT, &(float){1e5f}, 4), RF_BAD_INPUT);
+    assert_int_equal(load_changed(exemplar, block, size, marker + SHARE, &(float){0}, 4), RF_BAD_INPUT);
+    assert_int_equal(load_changed(exemplar, block, size, fading + SHARE, &(float){2}, 4), RF_BAD_INPUT);
+    assert_int_equal(load_changed(exemplar, block, size, DISTANCE, &(double){1e300}, 8), RF_BAD_INPUT);
+    rf_free(block);
+    rf_optimize_destroy(o);
+    rf_exemplar_destroy(exemplar);
+}
+
 static void land_is_zero_and_every_fluid_pixel_is_drawn(void **state)
 {
     (void)state;
@@ -165,7 +259,7 @@ static void land_is_zero_and_every_fluid_pixel_is_drawn(void **state)
     static float velocity[2 * SIDE * SIDE], pixels[NUMBERS];
     static uint8_t mask[SIDE * SIDE];
     int channels = channels_of(exemplar);
-    rotation(velocity, 0.1f);
+    shear(velocity);
     for (int i = 0; i < SIDE * SIDE; ++i)
         mask[i] = i % SIDE < 24;
     RfOptimize *o = make(exemplar);
@@ -302,6 +396,7 @@ int main(void)
         cmocka_unit_test(a_whole_shift_moves_the_texture_by_whole_pixels),
         cmocka_unit_test(the_bytes_do_not_depend_on_threads),
         cmocka_unit_test(a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused),
+        cmocka_unit_test(a_state_with_a_true_hash_and_absurd_numbers_is_refused),
         cmocka_unit_test(a_frame_swept_empty_in_one_step_is_full_again),
         cmocka_unit_test(what_fades_is_what_was_carried_there),
         cmocka_unit_test(an_exemplar_with_a_guide_is_refused),
