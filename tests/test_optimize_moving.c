@@ -159,6 +159,10 @@ static void a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused(voi
             assert_memory_equal(whole, resumed, (size_t)(SIDE * SIDE * channels) * sizeof *whole);
         }
         assert_true(rf_optimize_stats(o).patches > 0);
+        // The same moment once more is drawn, and no more.
+        step(o, velocity, NULL, FRAMES - 1, channels, resumed);
+        assert_memory_equal(whole, resumed, (size_t)(SIDE * SIDE * channels) * sizeof *whole);
+        assert_int_equal(rf_optimize_stats(o).patches, 0);
         rf_optimize_destroy(loaded);
         ((uint8_t *)block)[size - 1] ^= 1;
         assert_int_equal(rf_optimize_load(exemplar, &options, block, size, &loaded), RF_BAD_INPUT);
@@ -339,6 +343,24 @@ static void what_fades_is_what_was_carried_there(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
+static void an_absurd_flow_has_a_direction(void **state)
+{
+    (void)state;
+    static float velocity[2 * SIDE * SIDE];
+    static const float speeds[] = {1e-3f, 1, 1e20f, 3e38f};
+    RfFlowView flow = {.width = SIDE, .height = SIDE, .velocity = velocity};
+    for (int i = 0; i < 4; ++i)
+    {
+        // Twice as wide a frame as the flow: what it shows lies flatter.
+        uniform(velocity, speeds[i], -speeds[i]);
+        RfVec2 turn = rf_optimize_downstream(&flow, 2 * SIDE, SIDE, (RfVec2){7, 9});
+        assert_true(fabsf(turn.x - 2 / sqrtf(5)) < 1e-6f && fabsf(turn.y - 1 / sqrtf(5)) < 1e-6f);
+    }
+    uniform(velocity, 0, 0);
+    RfVec2 turn = rf_optimize_downstream(&flow, SIDE, SIDE, (RfVec2){7, 9});
+    assert_true(turn.x == 1 && turn.y == 0);
+}
+
 static void an_exemplar_with_a_guide_is_refused(void **state)
 {
     (void)state;
@@ -399,6 +421,7 @@ int main(void)
         cmocka_unit_test(a_state_with_a_true_hash_and_absurd_numbers_is_refused),
         cmocka_unit_test(a_frame_swept_empty_in_one_step_is_full_again),
         cmocka_unit_test(what_fades_is_what_was_carried_there),
+        cmocka_unit_test(an_absurd_flow_has_a_direction),
         cmocka_unit_test(an_exemplar_with_a_guide_is_refused),
         cmocka_unit_test(every_cell_finds_its_nearest_known_one),
         cmocka_unit_test(land_is_zero_and_every_fluid_pixel_is_drawn),

@@ -310,7 +310,6 @@ static RfResult lay_patches(RfOptimize *o, int count)
 
 RfResult rf_optimize_renew(RfOptimize *o, const RfFlowView *flow)
 {
-    o->laid = 0;
     rf_optimize_judge(o, flow);
     for (int round = 0; round < ROUNDS; ++round)
     {
