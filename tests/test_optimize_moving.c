@@ -343,6 +343,114 @@ static void what_fades_is_what_was_carried_there(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
+static bool stop(void *user, const char *stage, double fraction)
+{
+    (void)user, (void)stage, (void)fraction;
+    return false;
+}
+
+static void a_stopped_step_changes_nothing(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], wanted[NUMBERS], pixels[NUMBERS];
+    const RfProgress stopping = {stop, NULL};
+    int channels = channels_of(exemplar);
+    shear(velocity);
+    run(exemplar, velocity, FRAMES, wanted);
+    RfOptimize *o = make(exemplar);
+    for (int f = 0; f < FRAMES; ++f)
+    {
+        RfFlowView flow = {.width = SIDE, .height = SIDE, .velocity = velocity, .time = f};
+        rf_set_progress(&stopping);
+        assert_int_equal(rf_optimize_advance(o, &flow, SIDE, SIDE), RF_CANCELLED);
+        rf_set_progress(NULL);
+        step(o, velocity, NULL, f, channels, pixels);
+    }
+    assert_memory_equal(wanted, pixels, (size_t)(SIDE * SIDE * channels) * sizeof *wanted);
+    rf_optimize_destroy(o);
+    rf_exemplar_destroy(exemplar);
+}
+
+static int g_left, g_live;
+
+static void *scarce_allocate(size_t bytes, size_t alignment, void *user)
+{
+    (void)user;
+    void *memory = NULL;
+    if (__atomic_fetch_sub(&g_left, 1, __ATOMIC_RELAXED) <= 0 || posix_memalign(&memory, alignment, bytes) != 0)
+        return NULL;
+    __atomic_fetch_add(&g_live, 1, __ATOMIC_RELAXED);
+    return memory;
+}
+
+static void scarce_release(void *memory, void *user)
+{
+    (void)user;
+    __atomic_fetch_sub(&g_live, 1, __ATOMIC_RELAXED);
+    free(memory);
+}
+
+// Created, moved, saved and loaded, until something fails.
+static RfResult live(const RfExemplar *exemplar, const float *velocity, float *pixels)
+{
+    RfOptimizeOptions options = rf_optimize_defaults();
+    options.iterations = 1;
+    options.windows[0] = 9;
+    options.windows[1] = 0;
+    options.orient = RF_ORIENT_FLOW;
+    RfOptimize *o = NULL, *loaded = NULL;
+    RfImageView frame = {pixels, 16, 16, 3, 16 * 3};
+    void *block = NULL;
+    size_t size = 0;
+    int patches = 0;
+    RfResult result = rf_optimize_create(exemplar, &options, &o);
+    for (int f = 0; f < 7 && result == RF_OK; ++f)
+    {
+        RfFlowView flow = {.width = SIDE, .height = SIDE, .velocity = velocity, .time = f};
+        pixels[0] = -3;
+        result = rf_optimize_step(o, &flow, &frame);
+        assert_true((result == RF_OK) == (pixels[0] != -3));
+        patches += rf_optimize_stats(o).patches;
+    }
+    if (result == RF_OK)
+        result = rf_optimize_save(o, &block, &size);
+    if (result == RF_OK)
+        result = rf_optimize_load(exemplar, &options, block, size, &loaded);
+    assert_true((result == RF_OK) == (loaded != NULL));
+    rf_optimize_destroy(o);
+    rf_optimize_destroy(loaded);
+    rf_free(block);
+    assert_true(patches > 0 || result != RF_OK);
+    return result;
+}
+
+static void any_allocation_may_fail_and_nothing_leaks_or_is_drawn(void **state)
+{
+    (void)state;
+    const RfAllocator scarce = {scarce_allocate, scarce_release, NULL};
+    static float velocity[2 * SIDE * SIDE], pixels[16 * 16 * 3];
+    shear(velocity);
+    rf_set_threads(1);
+    g_left = 1 << 30;
+    rf_set_allocator(&scarce);
+    RfExemplar *exemplar = scene_noise_exemplar(16, 1);
+    int before = g_live, needed = 0;
+    RfResult result = RF_OUT_OF_MEMORY;
+    for (; needed < 2000 && result != RF_OK; ++needed)
+    {
+        g_left = needed;
+        result = live(exemplar, velocity, pixels);
+        assert_true(result == RF_OK || result == RF_OUT_OF_MEMORY);
+        assert_int_equal(g_live, before);
+    }
+    rf_exemplar_destroy(exemplar);
+    rf_set_allocator(NULL);
+    rf_set_threads(0);
+    assert_int_equal(result, RF_OK);
+    assert_true(needed > 20);
+}
+
 static void an_absurd_flow_has_a_direction(void **state)
 {
     (void)state;
@@ -421,6 +529,8 @@ int main(void)
         cmocka_unit_test(a_state_with_a_true_hash_and_absurd_numbers_is_refused),
         cmocka_unit_test(a_frame_swept_empty_in_one_step_is_full_again),
         cmocka_unit_test(what_fades_is_what_was_carried_there),
+        cmocka_unit_test(a_stopped_step_changes_nothing),
+        cmocka_unit_test(any_allocation_may_fail_and_nothing_leaks_or_is_drawn),
         cmocka_unit_test(an_absurd_flow_has_a_direction),
         cmocka_unit_test(an_exemplar_with_a_guide_is_refused),
         cmocka_unit_test(every_cell_finds_its_nearest_known_one),
