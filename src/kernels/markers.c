@@ -115,8 +115,9 @@ static RfBend strained(RfBend bend, RfBend j)
     RfBend inverse = {{d / det, -c / det}, {-b / det, a / det}};
     RfBend minus = {{2 - a, -c}, {-b, 2 - d}};
     bend = product(bend, product(minus, inverse));
-    float most = rf_max(rf_max(fabsf(bend.x.x), fabsf(bend.x.y)), rf_max(fabsf(bend.y.x), fabsf(bend.y.y)));
-    return most < 1e6f ? bend : (RfBend){{0, 0}, {0, 0}};
+    // Of absurd flows parts may be NaN, which rf_max passes over.
+    bool sound = fabsf(bend.x.x) < 1e6f && fabsf(bend.x.y) < 1e6f && fabsf(bend.y.x) < 1e6f && fabsf(bend.y.y) < 1e6f;
+    return sound ? bend : (RfBend){{0, 0}, {0, 0}};
 }
 
 static void carry_marker(const Carrying *k, RfMarker *m)

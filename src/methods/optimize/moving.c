@@ -87,15 +87,13 @@ void rf_optimize_destroy(RfOptimize *o)
 
 // ---- the first frame
 
-// How a picture's texture lies in the flow at a point of the frame: the exemplar's x axis points downstream. (1, 0)
-// where the flow stands still.
 RfVec2 rf_optimize_downstream(const RfFlowView *flow, int width, int height, RfVec2 at)
 {
     RfVec2 v = rf_flow_sample(flow, (at.x + 0.5f) * (float)flow->width / (float)width,
                               (at.y + 0.5f) * (float)flow->height / (float)height, rf_flow_blend(flow, flow->time));
-    v = (RfVec2){v.x * (float)width / (float)flow->width, v.y * (float)height / (float)flow->height};
-    float length = rf_vec2_length(v);
-    return length > 1e-6f ? (RfVec2){v.x / length, -v.y / length} : (RfVec2){1, 0};
+    // In double, where the square of no float overflows.
+    double x = (double)v.x * width / flow->width, y = (double)v.y * height / flow->height, length = sqrt(x * x + y * y);
+    return length > 1e-6 ? (RfVec2){(float)(x / length), (float)(-y / length)} : (RfVec2){1, 0};
 }
 
 static RfResult start_turned(const RfOptimize *o, const RfFlowView *flow, int width, int height, RfOptimizeStart *start)
@@ -232,6 +230,7 @@ RfResult rf_optimize_advance(RfOptimize *o, const RfFlowView *flow, int width, i
     RF_REQUIRE(o && flow, "rf_optimize_advance: optimize or flow is NULL");
     RF_TRY(check_step(o, flow, width, height));
     double start = rf_seconds(), carried = start;
+    o->laid = 0;
     if (!o->placed)
         RF_TRY(begin(o, flow, width, height));
     else if (flow->time > o->time)

@@ -228,12 +228,17 @@ static void fit(void *context, int item, int worker)
 
 // ---- lay
 
+// Of what was laid over a moment ago: so much of it is seen.
+static const float FRESH = 1 - 1.0f / RF_FADING_FRAMES;
+
 static void replace(RfOptimize *o, const RfPatch *p, int x, int y, RfVec2 step)
 {
     size_t pixel = (size_t)y * (size_t)o->markers.width + (size_t)x;
     RfMarker *marker = &o->markers.pixels[pixel], *fading = &o->fading.pixels[pixel];
-    *fading = *marker;
-    fading->share = 1 - 1.0f / RF_FADING_FRAMES;
+    // Laid over once more in the same step: what lay here between was never seen, so that it cannot fade.
+    if (fading->share < FRESH)
+        *fading = *marker;
+    fading->share = FRESH;
     *marker = (RfMarker){{(float)x, (float)y}, rf_vec2_add(p->source, rf_turn(p->turn, step)), rf_bend_of(p->turn), 1};
 }
 
@@ -294,7 +299,6 @@ static RfResult lay_patches(RfOptimize *o, int count)
 
 RfResult rf_optimize_renew(RfOptimize *o, const RfFlowView *flow)
 {
-    o->laid = 0;
     rf_optimize_judge(o, flow);
     for (int round = 0; round < ROUNDS; ++round)
     {

@@ -111,12 +111,29 @@ static RfResult check_state(const StateHeader *h, uint64_t inputs, const void *b
     if (h->inputs != inputs)
         return rf_fail(RF_BAD_INPUT, NULL, "header", "saved with another exemplar or other options: start again");
     bool sized = h->placed == 1 && h->width >= 8 && h->width <= RF_MAX_SIZE && h->height >= 8 &&
-                 h->height <= RF_MAX_SIZE && h->fading >= 0 && h->fading <= h->width * h->height && isfinite(h->time);
+                 h->height <= RF_MAX_SIZE && h->fading >= 0 && h->fading <= h->width * h->height && isfinite(h->time) &&
+                 h->distance >= 0 && h->distance < 1e20;
     size_t rest = size - sizeof *h;
     bool whole = sized ? rest == rest_size(h->width, h->height, h->fading) : h->placed == 0 && !rest;
     if (!whole || h->content != content_hash(*h, (const uint8_t *)block + sizeof *h, rest))
         return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
     return RF_OK;
+}
+
+static bool is_finite(RfVec2 v)
+{
+    return isfinite(v.x) && isfinite(v.y);
+}
+
+// Every pixel has a marker, in order; those that fade come after them. All lie in their pixel.
+static bool is_sound(const RfOptimize *o, const Record *r, size_t number, size_t pixels)
+{
+    int width = o->markers.width;
+    if (r->pixel < 0 || (size_t)r->pixel >= pixels || (number < pixels && (size_t)r->pixel != number))
+        return false;
+    bool near = fabsf(r->at.x - (float)(r->pixel % width)) <= 1 && fabsf(r->at.y - (float)(r->pixel / width)) <= 1;
+    return near && is_finite(r->source) && is_finite(r->bend.x) && is_finite(r->bend.y) && r->share > 0 &&
+           r->share <= 1;
 }
 
 static RfResult restore(RfOptimize *o, const StateHeader *h, const uint8_t *rest, size_t size)
@@ -129,7 +146,7 @@ static RfResult restore(RfOptimize *o, const StateHeader *h, const uint8_t *rest
         Record record;
         memcpy(&record, rest + i * sizeof record, sizeof record);
         RfMarkers *m = i < pixels ? &o->markers : &o->fading;
-        if (record.pixel < 0 || (size_t)record.pixel >= pixels)
+        if (!is_sound(o, &record, i, pixels))
             return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
         m->pixels[record.pixel] = (RfMarker){record.at, record.source, record.bend, record.share};
     }

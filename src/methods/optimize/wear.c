@@ -101,7 +101,10 @@ static void smooth_column(void *context, int column, int worker)
 
 static float limit_of(const RfOptimize *o, RfVec2 s)
 {
-    uint64_t block = (uint64_t)(int64_t)floorf(s.y / BLOCK) << 32 ^ (uint64_t)(int64_t)floorf(s.x / BLOCK);
+    // Places on an exemplar that tiles may lie anywhere: casts stay defined.
+    int64_t column = (int64_t)floorf(rf_clamp(s.x, -1e9f, 1e9f) / BLOCK);
+    int64_t row = (int64_t)floorf(rf_clamp(s.y, -1e9f, 1e9f) / BLOCK);
+    uint64_t block = (uint64_t)row << 32 ^ (uint64_t)column;
     float random = (float)rf_random_below(1024, o->options.seed, 0, block, 0) / 512 - 1;
     return 1 + LIMITS_DIFFER * random;
 }
