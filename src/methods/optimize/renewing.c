@@ -7,7 +7,8 @@
 //     cut      the closed line round the place along which the patch differs least from what it is laid on
 //     lay      markers inside the line are replaced; the old ones fade
 //
-// some times over; what is worn then waits for the next frame. A patch is large, and inside it the texture is the
+// What is worn elsewhere waits for the next frame: laid at once, more of the picture is new at a time, and more of it
+// flickers (lava in turbulence 0.24 over its floor, not 0.18). A patch is large, and inside it the texture is the
 // exemplar's own: what is bad in its surroundings is not passed on. Small windows that are matched one by one pass it
 // on: within 30 frames of a vortex pebbles are shards, and lava is a dark field, since what is smooth is least unlike
 // to anything. Against that the cost of a window is lowered by a part of its own variation (rf_synthesis_penalties).
@@ -21,15 +22,13 @@
 
 enum
 {
-    /// Times that places are chosen in a step.
-    ROUNDS = 4,
     /// Pixels from one that is asked for where it comes from to the next, when the use of the exemplar is counted.
     SAMPLED = 4
 };
 
 // What a place used twice as much as the mean costs, against the last patches' mean distance, for each unit of `spread`
-// over rf_usage's step. With 1, bright pebbles crowd out the others; with 12 patches fit too badly.
-static const float PRICE = 4;
+// over rf_usage's step. With much less bright pebbles crowd out the others, with more patches fit badly.
+static const float PRICE = 2;
 
 static int index_in(float at, int n, bool tiles)
 {
@@ -290,7 +289,7 @@ static RfResult lay_patches(RfOptimize *o, int count)
         sum += (double)o->matches[i].distance;
     }
     o->distance = sum / count;
-    o->laid += count;
+    o->laid = count;
     rf_parallel_for(count, fit, o);
     for (int i = 0; i < count; ++i)
         lay(o, &o->patches[i]);
@@ -300,14 +299,9 @@ static RfResult lay_patches(RfOptimize *o, int count)
 RfResult rf_optimize_renew(RfOptimize *o, const RfFlowView *flow)
 {
     rf_optimize_judge(o, flow);
-    for (int round = 0; round < ROUNDS; ++round)
-    {
-        int count = choose(o);
-        if (count == 0)
-            break;
-        if (round == 0)
-            set_penalties(o);
-        RF_TRY(lay_patches(o, count));
-    }
-    return RF_OK;
+    int count = choose(o);
+    if (count == 0)
+        return RF_OK;
+    set_penalties(o);
+    return lay_patches(o, count);
 }
