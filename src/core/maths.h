@@ -65,6 +65,12 @@ static inline int rf_mirror_int(int x, int n)
     return r < n ? r : 2 * n - 1 - r;
 }
 
+/// Index brought into 0 .. n - 1: round the border of what tiles, else to the nearest end.
+static inline int rf_border_int(int x, int n, bool tiles)
+{
+    return tiles ? rf_wrap_int(x, n) : rf_clamp_int(x, 0, n - 1);
+}
+
 static inline RfVec2 rf_vec2_add(RfVec2 a, RfVec2 b)
 {
     return (RfVec2){a.x + b.x, a.y + b.y};

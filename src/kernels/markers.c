@@ -157,6 +157,12 @@ static int pixel_of(const RfMarkers *m, RfVec2 *at)
     return inside ? (int)y * m->width + (int)x : -1;
 }
 
+static int rows_apart(const RfMarkers *m, int a, int b)
+{
+    int rows = abs(a - b);
+    return m->tiles ? rf_min_int(rows, m->height - rows) : rows;
+}
+
 static void carry_row(void *context, int row, int worker)
 {
     (void)worker;
@@ -172,7 +178,7 @@ static void carry_row(void *context, int row, int worker)
         carry_marker(k, &m->pixels[i]);
         m->index[i] = pixel_of(m, &m->pixels[i].at);
         if (m->index[i] >= 0)
-            m->reach[row] = rf_max_int(m->reach[row], abs(m->index[i] / m->width - row));
+            m->reach[row] = rf_max_int(m->reach[row], rows_apart(m, m->index[i] / m->width, row));
     }
 }
 
@@ -191,15 +197,21 @@ static void sort_band(void *context, int item, int worker)
     RfMarkers *m = k->markers;
     size_t width = (size_t)m->width, top = (size_t)(item * k->band);
     size_t bottom = (size_t)rf_min_int((item + 1) * k->band, m->height);
-    size_t from = (size_t)rf_max_int((int)top - k->reach, 0),
-           to = (size_t)rf_min_int((int)bottom + k->reach, m->height);
     for (size_t i = top * width; i < bottom * width; ++i)
         m->next[i].share = 0;
-    for (size_t i = from * width; i < to * width; ++i)
+    int from = (int)top - k->reach, to = (int)bottom + k->reach;
+    if (!m->tiles)
+        from = rf_max_int(from, 0), to = rf_min_int(to, m->height);
+    to = rf_min_int(to, from + m->height);
+    for (int row = from; row < to; ++row)
     {
-        int32_t pixel = m->index[i];
-        if (pixel >= (int32_t)(top * width) && pixel < (int32_t)(bottom * width) && !(m->next[pixel].share > 0))
-            m->next[pixel] = m->pixels[i];
+        size_t first = (size_t)rf_wrap_int(row, m->height) * width;
+        for (size_t i = first; i < first + width; ++i)
+        {
+            int32_t pixel = m->index[i];
+            if (pixel >= (int32_t)(top * width) && pixel < (int32_t)(bottom * width) && !(m->next[pixel].share > 0))
+                m->next[pixel] = m->pixels[i];
+        }
     }
 }
 
@@ -225,14 +237,18 @@ static int32_t look_round(const RfMarkers *m, int x, int y)
 {
     int32_t found = -1;
     int least = 2 * NEAR * NEAR + 1;
-    for (int j = rf_max_int(y - NEAR, 0); j <= rf_min_int(y + NEAR, m->height - 1); ++j)
-        for (int i = rf_max_int(x - NEAR, 0); i <= rf_min_int(x + NEAR, m->width - 1); ++i)
+    for (int j = y - NEAR; j <= y + NEAR; ++j)
+        for (int i = x - NEAR; i <= x + NEAR; ++i)
         {
             int square = (i - x) * (i - x) + (j - y) * (j - y);
-            if (square < least && m->pixels[(ptrdiff_t)j * m->width + i].share > 0)
+            bool outside = i < 0 || j < 0 || i >= m->width || j >= m->height;
+            if (square >= least || (outside && !m->tiles))
+                continue;
+            int32_t pixel = rf_wrap_int(j, m->height) * m->width + rf_wrap_int(i, m->width);
+            if (m->pixels[pixel].share > 0)
             {
                 least = square;
-                found = j * m->width + i;
+                found = pixel;
             }
         }
     return found;
@@ -251,6 +267,12 @@ static void look_row(void *context, int y, int worker)
     }
 }
 
+// The way round a border, where it is shorter.
+static float shortest(float step, int n)
+{
+    return step - floorf(step / (float)n + 0.5f) * (float)n;
+}
+
 static void fill_row(void *context, int y, int worker)
 {
     (void)worker;
@@ -262,9 +284,11 @@ static void fill_row(void *context, int y, int worker)
             continue;
         // Before they were sorted into pixels, markers lay in the order of those they came from.
         RfMarker from = nearest < 0 ? m->next[own] : m->pixels[nearest];
-        RfVec2 at = {(float)x, (float)y};
+        RfVec2 at = {(float)x, (float)y}, step = rf_vec2_sub(at, from.at);
+        if (m->tiles)
+            step = (RfVec2){shortest(step.x, m->width), shortest(step.y, m->height)};
         if (nearest >= 0)
-            from.source = rf_vec2_add(from.source, rf_bend(from.bend, rf_vec2_sub(at, from.at)));
+            from.source = rf_vec2_add(from.source, rf_bend(from.bend, step));
         from.at = at;
         m->pixels[own] = from;
     }
@@ -283,16 +307,11 @@ void rf_markers_fill(RfMarkers *m)
 
 // ---- draw
 
-static int index_in(int i, int n, bool tiles)
-{
-    return tiles ? rf_wrap_int(i, n) : rf_clamp_int(i, 0, n - 1);
-}
-
 RfVec2 rf_markers_source(const RfMarkers *m, RfVec2 at)
 {
     // Points far outside are given what the border says: casts stay defined.
     int x = (int)floorf(rf_clamp(at.x, -1e6f, 1e6f) + 0.5f), y = (int)floorf(rf_clamp(at.y, -1e6f, 1e6f) + 0.5f);
-    int px = index_in(x, m->width, m->tiles), py = index_in(y, m->height, m->tiles);
+    int px = rf_border_int(x, m->width, m->tiles), py = rf_border_int(y, m->height, m->tiles);
     const RfMarker *k = &m->pixels[(ptrdiff_t)py * m->width + px];
     RfVec2 step = {at.x - k->at.x, at.y - k->at.y};
     if (m->tiles)
@@ -302,7 +321,7 @@ RfVec2 rf_markers_source(const RfMarkers *m, RfVec2 at)
 
 // Adds a place to the voice that says the same, or as a new one. `out` holds weights, and sums of places times weights
 // in `sums`.
-static void add_voice(RfVoices *out, RfVec2 *sums, RfVec2 place, float weight)
+static void add_voice(RfVoices *out, RfVec2 *sums, const RfMarker *marker, RfVec2 place, float weight)
 {
     int g = 0;
     while (g < out->count &&
@@ -311,6 +330,7 @@ static void add_voice(RfVoices *out, RfVec2 *sums, RfVec2 place, float weight)
     if (g == out->count)
     {
         out->places[g] = place;
+        out->markers[g] = marker;
         out->shares[g] = 0;
         sums[g] = (RfVec2){0, 0};
         ++out->count;
@@ -335,7 +355,7 @@ void rf_markers_hear(const RfMarkers *m, int x, int y, RfVoices *out)
         {
             if (!m->tiles && (i < 0 || j < 0 || i >= m->width || j >= m->height))
                 continue;
-            int pi = index_in(i, m->width, m->tiles), pj = index_in(j, m->height, m->tiles);
+            int pi = rf_border_int(i, m->width, m->tiles), pj = rf_border_int(j, m->height, m->tiles);
             const RfMarker *k = &m->pixels[(ptrdiff_t)pj * m->width + pi];
             if (!(k->share > 0))
                 continue;
@@ -344,7 +364,7 @@ void rf_markers_hear(const RfMarkers *m, int x, int y, RfVoices *out)
             if (weight <= 0)
                 continue;
             weight *= weight;
-            add_voice(out, sums, rf_vec2_add(k->source, rf_bend(k->bend, step)), weight);
+            add_voice(out, sums, k, rf_vec2_add(k->source, rf_bend(k->bend, step)), weight);
             total += weight;
         }
     for (int g = 0; g < out->count; ++g)

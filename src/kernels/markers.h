@@ -59,6 +59,8 @@ typedef struct RfVoices
     int count;
     RfVec2 places[RF_MAX_VOICES];
     float shares[RF_MAX_VOICES];
+    /// One of the markers that say so.
+    const RfMarker *markers[RF_MAX_VOICES];
 } RfVoices;
 
 void rf_markers_hear(const RfMarkers *markers, int x, int y, RfVoices *out);

@@ -115,7 +115,7 @@ typedef struct Show
 static int nearest_pixel(float at, int n, bool tiles)
 {
     int i = (int)floorf(at + 0.5f);
-    return tiles ? rf_wrap_int(i, n) : rf_clamp_int(i, 0, n - 1);
+    return rf_border_int(i, n, tiles);
 }
 
 static void show_row(void *context, int y, int worker)

@@ -136,11 +136,6 @@ static RfVec2 compared_at(const Walk *walk, const RfSynthesisWindow *window)
                     (float)rf_clamp_int(whole(window->at.y), half, f->height - 1 - half)};
 }
 
-static int frame_index(int i, int n, bool tiles)
-{
-    return tiles ? rf_wrap_int(i, n) : rf_clamp_int(i, 0, n - 1);
-}
-
 static void add_coherent(const Walk *walk, Candidates *c, const RfSynthesisWindow *window, RfVec2 at)
 {
     const RfSynthesisFrame *f = walk->search->frame;
@@ -150,8 +145,8 @@ static void add_coherent(const Walk *walk, Candidates *c, const RfSynthesisWindo
             RfVec2 step = {(float)walk->asked[i], (float)walk->asked[j]};
             RfVec2 point = rf_vec2_add(at, walk->search->plain ? step : rf_turn_back(window->turn, step));
             int x = whole(point.x), y = whole(point.y);
-            RfVec2 source = f->sources[(ptrdiff_t)frame_index(y, f->height, f->tiles) * f->width +
-                                       frame_index(x, f->width, f->tiles)];
+            RfVec2 source = f->sources[(ptrdiff_t)rf_border_int(y, f->height, f->tiles) * f->width +
+                                       rf_border_int(x, f->width, f->tiles)];
             RfVec2 rest = rf_turn(window->turn, (RfVec2){point.x - (float)x, point.y - (float)y});
             add(walk, c, rf_vec2_sub(rf_vec2_add(source, rest), step));
         }
@@ -167,8 +162,8 @@ static void gather(const Walk *walk, const RfSynthesisWindow *window, RfVec2 at,
         {
             RfVec2 point = rf_vec2_add(at, rf_turn_back(window->turn, (RfVec2){(float)i, (float)j}));
             memcpy(out,
-                   rf_fixed_at(&f->picture, frame_index(whole(point.x), f->width, f->tiles),
-                               frame_index(whole(point.y), f->height, f->tiles)),
+                   rf_fixed_at(&f->picture, rf_border_int(whole(point.x), f->width, f->tiles),
+                               rf_border_int(whole(point.y), f->height, f->tiles)),
                    (size_t)channels * sizeof *out);
         }
 }

@@ -262,6 +262,12 @@ static RfVec2 within_reach(RfVec2 place)
     return (RfVec2){rf_clamp(place.x, -1e6f, 1e6f), rf_clamp(place.y, -1e6f, 1e6f)};
 }
 
+static void sample_voice(const Drawing *d, const RfVoices *voices, int g, float *values)
+{
+    RfVec2 lies = d->directions ? rf_bend_parts(voices->markers[g]->bend).turn : (RfVec2){1, 0};
+    rf_optimize_sample(&d->o->material, within_reach(voices->places[g]), d->directions ? &lies : NULL, NULL, values);
+}
+
 // The mean of what all voices say. False: nobody says anything.
 static bool draw_pixel(const Drawing *d, const RfMarkers *m, int x, int y, float *values)
 {
@@ -269,19 +275,13 @@ static bool draw_pixel(const Drawing *d, const RfMarkers *m, int x, int y, float
     rf_markers_hear(m, x, y, &voices);
     if (voices.count == 0)
         return false;
-    RfVec2 lies, *turn = NULL;
-    if (d->directions)
-    {
-        lies = rf_bend_parts(m->pixels[(ptrdiff_t)y * m->width + x].bend).turn;
-        turn = &lies;
-    }
-    rf_optimize_sample(&d->o->material, within_reach(voices.places[0]), turn, NULL, values);
+    sample_voice(d, &voices, 0, values);
     for (int c = 0; c < d->frame->channels && voices.count > 1; ++c)
         values[c] *= voices.shares[0];
     for (int g = 1; g < voices.count; ++g)
     {
         float other[RF_MAX_EXEMPLAR_CHANNELS];
-        rf_optimize_sample(&d->o->material, within_reach(voices.places[g]), turn, NULL, other);
+        sample_voice(d, &voices, g, other);
         for (int c = 0; c < d->frame->channels; ++c)
             values[c] += voices.shares[g] * other[c];
     }

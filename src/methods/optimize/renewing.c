@@ -35,7 +35,7 @@ static int index_in(float at, int n, bool tiles)
     int i = (int)floorf(rf_clamp(at, -1e6f, 1e6f) + 0.5f);
     if (i >= 0 && i < n)
         return i;
-    return tiles ? rf_wrap_int(i, n) : rf_clamp_int(i, 0, n - 1);
+    return rf_border_int(i, n, tiles);
 }
 
 static const float *pixel_at(const RfSynthesisExemplar *e, RfVec2 s)

@@ -13,11 +13,6 @@ static void cubic_weights(float t, float w[4])
     w[3] = (0.5f * t - 0.5f) * t * t;
 }
 
-static int index_of(const RfExemplar *e, int i, int n)
-{
-    return e->tiles ? rf_wrap_int(i, n) : rf_clamp_int(i, 0, n - 1);
-}
-
 // False: the pixels of the exemplar as they are.
 static bool sample_all(const RfExemplar *e, RfVec2 source, float *values)
 {
@@ -25,8 +20,9 @@ static bool sample_all(const RfExemplar *e, RfVec2 source, float *values)
     float u = source.x - (float)x, v = source.y - (float)y, wx[4], wy[4];
     if (u == 0 && v == 0)
     {
-        const float *pixel =
-            e->pixels + ((ptrdiff_t)index_of(e, y, e->height) * e->width + index_of(e, x, e->width)) * e->channels;
+        const float *pixel = e->pixels + ((ptrdiff_t)rf_border_int(y, e->height, e->tiles) * e->width +
+                                          rf_border_int(x, e->width, e->tiles)) *
+                                             e->channels;
         memcpy(values, pixel, (size_t)e->channels * sizeof *values);
         return false;
     }
@@ -36,8 +32,8 @@ static bool sample_all(const RfExemplar *e, RfVec2 source, float *values)
     ptrdiff_t columns[4], rows[4];
     for (int i = 0; i < 4; ++i)
     {
-        columns[i] = (ptrdiff_t)index_of(e, x + i - 1, e->width) * e->channels;
-        rows[i] = (ptrdiff_t)index_of(e, y + i - 1, e->height) * e->width * e->channels;
+        columns[i] = (ptrdiff_t)rf_border_int(x + i - 1, e->width, e->tiles) * e->channels;
+        rows[i] = (ptrdiff_t)rf_border_int(y + i - 1, e->height, e->tiles) * e->width * e->channels;
     }
     for (int c = 0; c < e->channels; ++c)
     {
