@@ -7,11 +7,12 @@
 //     cut      the closed line round the place along which the patch differs least from what it is laid on
 //     lay      markers inside the line are replaced; the old ones fade
 //
-// What is worn elsewhere waits for the next frame: laid at once, more of the picture is new at a time, and more of it
-// flickers (lava in turbulence 0.24 over its floor, not 0.18). A patch is large, and inside it the texture is the
-// exemplar's own: what is bad in its surroundings is not passed on. Small windows that are matched one by one pass it
-// on: within 30 frames of a vortex pebbles are shards, and lava is a dark field, since what is smooth is least unlike
-// to anything. Against that the cost of a window is lowered by a part of its own variation (rf_synthesis_penalties).
+// again while anything is badly worn. What is worn less waits for the next frame: laid at once, more of the picture is
+// new at a time, and more of it flickers (lava in turbulence 0.24 over its floor, not 0.18). A patch is large, and
+// inside it the texture is the exemplar's own: what is bad in its surroundings is not passed on. Small windows that are
+// matched one by one pass it on: within 30 frames of a vortex pebbles are shards, and lava is a dark field, since what
+// is smooth is least unlike to anything. Against that the cost of a window is lowered by a part of its own variation
+// (rf_synthesis_penalties).
 #include "core/parallel.h"
 #include "core/result.h"
 #include "methods/optimize/moving.h"
@@ -22,10 +23,14 @@
 
 enum
 {
+    /// Times that places are chosen in a step.
+    ROUNDS = 4,
     /// Pixels from one that is asked for where it comes from to the next, when the use of the exemplar is counted.
     SAMPLED = 4
 };
 
+// What is worn by so much more than may be is renewed at once. Else it waits.
+static const float URGENT = 3;
 // What a place used twice as much as the mean costs, against the last patches' mean distance, for each unit of `spread`
 // over rf_usage's step. With much less bright pebbles crowd out the others, with more patches fit badly.
 static const float PRICE = 2;
@@ -75,12 +80,12 @@ static void take(RfOptimize *o, RfVec2 at)
         }
 }
 
-static int choose(RfOptimize *o)
+static int choose(RfOptimize *o, float limit)
 {
     int worn = 0, count = 0;
     size_t cells = (size_t)o->columns * (size_t)o->rows;
     for (int i = 0; i < (int)cells; ++i)
-        if (o->wear[i] > 1)
+        if (o->wear[i] > limit)
             o->worn[worn++] = (RfWornPlace){o->wear[i], i};
     qsort(o->worn, (size_t)worn, sizeof *o->worn, by_wear);
     memset(o->taken, 0, cells);
@@ -234,6 +239,10 @@ static void replace(RfOptimize *o, const RfPatch *p, int x, int y, RfVec2 step)
 {
     size_t pixel = (size_t)y * (size_t)o->markers.width + (size_t)x;
     RfMarker *marker = &o->markers.pixels[pixel], *fading = &o->fading.pixels[pixel];
+    int cell = y / RF_WEAR_GRAIN * o->columns + x / RF_WEAR_GRAIN;
+    RfVec2 middle = rf_optimize_cell_middle(o, cell);
+    if (x == (int)middle.x && y == (int)middle.y)
+        o->wear[cell] = 0;
     // Laid over once more in the same step: what lay here between was never seen, so that it cannot fade.
     if (fading->share < FRESH)
         *fading = *marker;
@@ -289,7 +298,7 @@ static RfResult lay_patches(RfOptimize *o, int count)
         sum += (double)o->matches[i].distance;
     }
     o->distance = sum / count;
-    o->laid = count;
+    o->laid += count;
     rf_parallel_for(count, fit, o);
     for (int i = 0; i < count; ++i)
         lay(o, &o->patches[i]);
@@ -299,9 +308,14 @@ static RfResult lay_patches(RfOptimize *o, int count)
 RfResult rf_optimize_renew(RfOptimize *o, const RfFlowView *flow)
 {
     rf_optimize_judge(o, flow);
-    int count = choose(o);
-    if (count == 0)
-        return RF_OK;
-    set_penalties(o);
-    return lay_patches(o, count);
+    for (int round = 0; round < ROUNDS; ++round)
+    {
+        int count = choose(o, round == 0 ? 1 : URGENT);
+        if (count == 0)
+            break;
+        if (round == 0)
+            set_penalties(o);
+        RF_TRY(lay_patches(o, count));
+    }
+    return RF_OK;
 }
