@@ -169,7 +169,7 @@ static void carry_row(void *context, int row, int worker)
     const Carrying *k = context;
     RfMarkers *m = k->markers;
     size_t first = (size_t)row * (size_t)m->width;
-    m->reach[row] = 0;
+    int reach = 0; // not in the array: rows of several threads lie side by side there
     for (size_t i = first; i < first + (size_t)m->width; ++i)
     {
         m->index[i] = -1;
@@ -178,8 +178,9 @@ static void carry_row(void *context, int row, int worker)
         carry_marker(k, &m->pixels[i]);
         m->index[i] = pixel_of(m, &m->pixels[i].at);
         if (m->index[i] >= 0)
-            m->reach[row] = rf_max_int(m->reach[row], rows_apart(m, m->index[i] / m->width, row));
+            reach = rf_max_int(reach, rows_apart(m, m->index[i] / m->width, row));
     }
+    m->reach[row] = reach;
 }
 
 typedef struct Sorting
@@ -258,13 +259,14 @@ static void look_row(void *context, int y, int worker)
 {
     (void)worker;
     RfMarkers *m = context;
-    m->reach[y] = 0;
+    int missing = 0;
     for (int x = 0; x < m->width; ++x)
     {
         int32_t own = y * m->width + x;
         m->index[own] = m->pixels[own].share > 0 ? own : look_round(m, x, y);
-        m->reach[y] += m->index[own] < 0;
+        missing += m->index[own] < 0;
     }
+    m->reach[y] = missing;
 }
 
 // The way round a border, where it is shorter.
