@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 build=$1
 out=$build/evaluation
 docs=docs/evaluation
-methods=(lagrangian lagrangian-fine eulerian eulerian-short eulerian-long dual dual-plain sprites warp)
+methods=(lagrangian lagrangian-fine optimize eulerian eulerian-short eulerian-long dual dual-plain sprites warp)
 
 rm -rf "$out"
 mkdir -p "$out" "$docs"
@@ -39,12 +39,16 @@ join() {
     for part in "$@"; do tail -n +2 "$out/$part.csv" >> "$out/$name.csv"; done
 }
 
-for flow in vortex turbulence cylinder wind; do run "main-$flow" main "flow=$flow" "out=$out"; done
+for flow in vortex turbulence cylinder wind; do
+    for exemplar in noise foam lava pebbles; do
+        run "main-$flow-$exemplar" main "flow=$flow" "exemplar=$exemplar" "out=$out"
+    done
+done
 for flow in vortex turbulence; do
     for exemplar in noise foam; do run "sweep-$flow-$exemplar" sweep frames=100 "flow=$flow" "exemplar=$exemplar"; done
 done
 finish
-join main main-{vortex,turbulence,cylinder,wind}
+join main main-{vortex,turbulence,cylinder,wind}-{noise,foam,lava,pebbles}
 join sweep sweep-{vortex,turbulence}-{noise,foam}
 "$build/evaluation_page" "$out/main.csv" "$out/sweep.csv" docs/evaluation.md "$docs"
 
