@@ -107,12 +107,12 @@ void rf_synthesis_settle_prices(const RfSynthesisFrame *frame, const RfSynthesis
 void rf_synthesis_prices(const RfSynthesisExemplar *exemplar, int side, const RfUsage *usage, float scale,
                          float *prices);
 
-/// Penalties of an exact search: the prices (as below, or NULL) times `unit`, less a part of the windows' variations
+/// Penalties of an exact search: the prices (as below, or NULL) times `unit`, less `part` of the windows' variations
 /// (rf_windows_vary, or NULL). What is smooth is least unlike to anything: for windows that have nothing to do with
 /// each other the sum of squared differences is, in the mean, the sum of both variations. Where nothing fits well yet,
 /// smooth windows would win, and a texture would lose its contrast.
 void rf_synthesis_penalties(const RfSynthesisExemplar *exemplar, const RfWindowDatabase *windows, int side,
-                            const float *prices, float unit, const float *variations, float *penalties);
+                            const float *prices, float unit, const float *variations, float part, float *penalties);
 
 typedef struct RfSynthesisSearch
 {
@@ -124,7 +124,7 @@ typedef struct RfSynthesisSearch
     const RfWindowDatabase *windows;
     /// [height][width] of the exemplar, for a window's centre, added to its cost; NULL: none.
     const float *prices;
-    /// rf_windows_vary of `windows`: costs are lowered as rf_synthesis_penalties says. NULL: they are not.
+    /// rf_windows_vary of `windows`: costs are lowered by 3/4 of them, see rf_synthesis_penalties. NULL: they are not.
     const float *variations;
     /// Whole pixels only, and nothing turned: the fast path.
     bool plain;

@@ -28,6 +28,10 @@ enum
     BATCH_NUMBERS = 1 << 24
 };
 
+// Part of its variation that a window's cost is lowered by. Of 3 x 3 times cracked earth of 96 x 96 pixels 0, 0.5, 0.75
+// and 1 leave 0.23, 0.32, 0.93 and 0.94 of the contrast.
+static const float VARIATION_PART = 0.75f;
+
 typedef struct Candidates
 {
     int count;
@@ -261,7 +265,7 @@ static void set_penalties(const Walk *walk, float *penalties)
 {
     const RfSynthesisSearch *s = walk->search;
     float unit = 1 / (s->exemplar->scale * s->exemplar->scale);
-    rf_synthesis_penalties(s->exemplar, s->windows, s->side, s->prices, unit, s->variations, penalties);
+    rf_synthesis_penalties(s->exemplar, s->windows, s->side, s->prices, unit, s->variations, VARIATION_PART, penalties);
 }
 
 static RfResult search_batch(Walk *walk, int count, const float *penalties, RfWindowMatch *matches)
