@@ -37,7 +37,7 @@ static RfMarkers identity(int width, int height, bool tiles)
     for (int i = 0; i < width * height; ++i)
     {
         RfVec2 at = {(float)(i % width), (float)(i / width)};
-        m.pixels[i] = (RfMarker){at, at, rf_bend_of((RfVec2){1, 0}), 1};
+        m.pixels[i] = (RfMarker){at, at, rf_bend_of((RfVec2){1, 0}), 1, 0};
     }
     return m;
 }
@@ -147,6 +147,7 @@ static void what_flows_in_continues_what_is_there(void **state)
         {
             float expected = (float)(tiles && x < 3 ? x - 3 + W : x - 3);
             assert_true(fabsf(m.pixels[7 * W + x].source.x - expected) < 1e-3f);
+            assert_true(m.pixels[7 * W + x].continued == (float)(tiles ? 0 : rf_max_int(3 - x, 0)));
         }
         // All of it swept out, where nothing comes in from the other side: it stays.
         for (int i = 0; i < W * H; ++i)
@@ -171,10 +172,15 @@ static void no_marker_no_voice(void **state)
     assert_int_equal(rf_markers_create(W, H, false, &m), RF_OK);
     rf_markers_hear(&m, 5, 5, &voices);
     assert_int_equal(voices.count, 0);
-    m.pixels[5 * W + 6] = (RfMarker){{6, 5}, {1, 2}, rf_bend_of((RfVec2){1, 0}), 0.5f};
+    assert_true(rf_markers_share(&m, 5, 5) == 0);
+    m.pixels[5 * W + 6] = (RfMarker){{6, 5}, {1, 2}, rf_bend_of((RfVec2){1, 0}), 0.5f, 0};
     rf_markers_hear(&m, 5, 5, &voices);
     assert_int_equal(voices.count, 1);
     assert_true(voices.places[0].x == 0 && voices.places[0].y == 2 && voices.shares[0] == 1);
+    // A gap is a pixel between two.
+    assert_true(rf_markers_share(&m, 6, 5) == 0.5f && rf_markers_share(&m, 5, 5) == 0);
+    m.pixels[5 * W + 4] = (RfMarker){{4, 5}, {1, 2}, rf_bend_of((RfVec2){1, 0}), 0.25f, 0};
+    assert_true(rf_markers_share(&m, 5, 5) == 0.375f);
     rf_markers_free(&m);
 }
 

@@ -3,6 +3,7 @@
 #include "riffle/riffle.h"
 #include "support/measure_check.h"
 #include "support/sanitized.h"
+#include "support/scarce.h"
 
 static float g_frame[PIXELS], g_map[2 * PIXELS];
 
@@ -340,31 +341,12 @@ static void a_step_stopped_anywhere_is_as_if_it_had_not_been(void **state)
 
 // ---- memory ------------------------------------------------------------------------------------------------------
 
-static int g_left, g_live;
-
-static void *scarce_allocate(size_t bytes, size_t alignment, void *user)
-{
-    (void)user;
-    void *memory = NULL;
-    if (__atomic_fetch_sub(&g_left, 1, __ATOMIC_RELAXED) <= 0 || posix_memalign(&memory, alignment, bytes) != 0)
-        return NULL;
-    __atomic_fetch_add(&g_live, 1, __ATOMIC_RELAXED);
-    return memory;
-}
-
-static void scarce_release(void *memory, void *user)
-{
-    (void)user;
-    __atomic_fetch_sub(&g_live, 1, __ATOMIC_RELAXED);
-    free(memory);
-}
-
 // A first frame of another size, larger than the one that found no memory, is judged after all.
 static void judge_larger(RfMeasure *measure)
 {
     RfImageView larger = {g_texture, 96, 80, 1, N};
     RfMeasureFrame m;
-    g_left = 100000;
+    scarce_allow(100000);
     assert_int_equal(rf_measure_step(measure, NULL, NULL, &larger, &m), RF_OK);
     assert_true(m.index == 0 && m.coverage.fluid == 96 * 80 && !isnan(m.patch.residual));
 }
@@ -381,7 +363,7 @@ static bool judge_scarcely(int allocations)
     static uint8_t mask[48 * 48];
     memset(mask, 1, sizeof mask);
     mask[5 * 48 + 5] = 0;
-    g_left = allocations;
+    scarce_allow(allocations);
     RfResult result = rf_measure_create(&exemplar, &options, &measure);
     if (result == RF_OK && (result = rf_measure_step(measure, &flow, mask, &a, &m)) != RF_OK)
         judge_larger(measure);
@@ -390,20 +372,19 @@ static bool judge_scarcely(int allocations)
         result = rf_measure_step(measure, &flow, mask, &b, &m);
     rf_measure_destroy(measure);
     assert_true(result == RF_OK || result == RF_OUT_OF_MEMORY);
-    assert_int_equal(g_live, 0);
+    assert_int_equal(scarce_live(), 0);
     return result == RF_OK;
 }
 
 static void any_allocation_may_fail_and_nothing_leaks(void **state)
 {
     (void)state;
-    const RfAllocator scarce = {scarce_allocate, scarce_release, NULL};
     rf_set_threads(1);
-    rf_set_allocator(&scarce);
+    scarce_begin(SCARCE_PLENTY);
     int needed = 0;
     while (needed < 2000 && !judge_scarcely(needed))
         needed += TEST_SANITIZED ? 4 : 1;
-    rf_set_allocator(NULL);
+    scarce_end();
     rf_set_threads(0);
     print_message("%d allocations\n", needed);
     assert_true(needed > 50 && needed < 2000);

@@ -2,6 +2,7 @@
 // Still textures: what any of them is.
 #include "support/optimize_check.h"
 #include "support/sanitized.h"
+#include "support/scarce.h"
 
 // ---- bytes
 
@@ -332,39 +333,18 @@ static void a_call_stopped_anywhere_leaves_the_picture_as_it_was(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
-static int g_left, g_live;
-
-static void *scarce_allocate(size_t bytes, size_t alignment, void *user)
-{
-    (void)user;
-    void *memory = NULL;
-    if (__atomic_fetch_sub(&g_left, 1, __ATOMIC_RELAXED) <= 0 || posix_memalign(&memory, alignment, bytes) != 0)
-        return NULL;
-    __atomic_fetch_add(&g_live, 1, __ATOMIC_RELAXED);
-    return memory;
-}
-
-static void scarce_release(void *memory, void *user)
-{
-    (void)user;
-    __atomic_fetch_sub(&g_live, 1, __ATOMIC_RELAXED);
-    free(memory);
-}
-
 static void any_allocation_may_fail_and_nothing_leaks_or_is_drawn(void **state)
 {
     (void)state;
-    const RfAllocator scarce = {scarce_allocate, scarce_release, NULL};
     float pixels[24 * 20], turns[24 * 20] = {0};
     RfImageView view = picture_of(pixels, 24, 20, 1);
     RfOptimizeOptions options = rf_optimize_defaults();
     options.iterations = 1;
     for (int turned = 0; turned < 2; ++turned)
     {
-        g_left = 1 << 30;
-        rf_set_allocator(&scarce);
+        scarce_begin(SCARCE_PLENTY);
         RfExemplar *exemplar = spotted_exemplar(24, 24, 1, RF_TILING_NO);
-        int before = g_live, needed = 0;
+        int before = scarce_live(), needed = 0;
         RfOptimizeConstraints constraints = {.target = picture_of(turns, 24, 20, 1)};
         if (turned)
             constraints.orientation = picture_of(turns, 24, 20, 1);
@@ -372,15 +352,15 @@ static void any_allocation_may_fail_and_nothing_leaks_or_is_drawn(void **state)
         for (; needed < 4000 && result != RF_OK; ++needed)
         {
             pixels[0] = pixels[24 * 20 - 1] = -3;
-            g_left = needed;
+            scarce_allow(needed);
             result = rf_optimize_still(exemplar, &options, &constraints, &view);
             assert_true(result == RF_OK || result == RF_OUT_OF_MEMORY);
-            assert_int_equal(g_live, before);
+            assert_int_equal(scarce_live(), before);
             if (result != RF_OK)
                 assert_true(pixels[0] == -3 && pixels[24 * 20 - 1] == -3);
         }
         rf_exemplar_destroy(exemplar);
-        rf_set_allocator(NULL);
+        scarce_end();
         print_message("%d allocations\n", needed);
         assert_true(needed > 20 && needed < 4000);
     }

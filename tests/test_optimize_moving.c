@@ -4,6 +4,7 @@
 #include "kernels/nearest_known.h"
 #include "methods/optimize/moving.h"
 #include "riffle/riffle.h"
+#include "support/scarce.h"
 #include "support/scenes.h"
 
 #include <math.h>
@@ -181,12 +182,13 @@ enum
     CONTENT = 24,
     TIME = 48,
     DISTANCE = 56,
-    RECORD = 40,
+    RECORD = 44,
     AT = 0,
     SOURCE = 12,
     BEND = 16,
     SHARE = 32,
-    PIXEL = 36
+    CONTINUED = 36,
+    PIXEL = 40
 };
 
 // As if it had been saved like this.
@@ -234,10 +236,10 @@ static void a_state_with_a_true_hash_and_absurd_numbers_is_refused(void **state)
     for (int i = 0; i < 3; ++i)
     {
         const float number = (float)doubles[i];
-        static const size_t places[] = {AT, SOURCE, BEND, SHARE};
+        static const size_t places[] = {AT, SOURCE, BEND, SHARE, CONTINUED};
         assert_int_equal(load_changed(exemplar, block, size, TIME, &doubles[i], 8), RF_BAD_INPUT);
         assert_int_equal(load_changed(exemplar, block, size, DISTANCE, &doubles[i], 8), RF_BAD_INPUT);
-        for (int k = 0; k < 4; ++k)
+        for (int k = 0; k < 5; ++k)
         {
             assert_int_equal(load_changed(exemplar, block, size, marker + places[k], &number, 4), RF_BAD_INPUT);
             assert_int_equal(load_changed(exemplar, block, size, fading + places[k], &number, 4), RF_BAD_INPUT);
@@ -250,6 +252,7 @@ static void a_state_with_a_true_hash_and_absurd_numbers_is_refused(void **state)
     assert_int_equal(load_changed(exemplar, block, size, marker + AT, &(float){1e5f}, 4), RF_BAD_INPUT);
     assert_int_equal(load_changed(exemplar, block, size, marker + SHARE, &(float){0}, 4), RF_BAD_INPUT);
     assert_int_equal(load_changed(exemplar, block, size, fading + SHARE, &(float){2}, 4), RF_BAD_INPUT);
+    assert_int_equal(load_changed(exemplar, block, size, marker + CONTINUED, &(float){-1}, 4), RF_BAD_INPUT);
     assert_int_equal(load_changed(exemplar, block, size, DISTANCE, &(double){1e300}, 8), RF_BAD_INPUT);
     rf_free(block);
     rf_optimize_destroy(o);
@@ -295,6 +298,27 @@ static void a_frame_swept_empty_in_one_step_is_full_again(void **state)
     for (int i = 0; i < SIDE * SIDE; ++i)
         same += memcmp(first + i * channels, later + i * channels, (size_t)channels * sizeof *first) == 0;
     assert_true(same > SIDE * SIDE * 9 / 10);
+    rf_exemplar_destroy(exemplar);
+}
+
+// What flows in is laid anew before it was continued far: lines where pieces meet at the border stay short.
+static void what_flows_in_is_renewed(void **state)
+{
+    (void)state;
+    RfExemplar *exemplar = make_exemplar();
+    static float velocity[2 * SIDE * SIDE], pixels[NUMBERS];
+    uniform(velocity, 3, 1);
+    RfOptimize *o = make(exemplar);
+    float farthest = 0;
+    for (int f = 0; f < 60; ++f)
+    {
+        step(o, velocity, NULL, f, channels_of(exemplar), pixels);
+        for (int i = 0; i < SIDE * SIDE; ++i)
+            farthest = fmaxf(farthest, o->markers.pixels[i].continued);
+    }
+    // 180 pixels flowed in. The limit is 0.3 to 0.7 of a patch's reach; what is three times as worn cannot wait.
+    assert_true(farthest > 3 && farthest < 3 * 0.7f * (float)o->outer + 4);
+    rf_optimize_destroy(o);
     rf_exemplar_destroy(exemplar);
 }
 
@@ -372,25 +396,6 @@ static void a_stopped_step_changes_nothing(void **state)
     rf_exemplar_destroy(exemplar);
 }
 
-static int g_left, g_live;
-
-static void *scarce_allocate(size_t bytes, size_t alignment, void *user)
-{
-    (void)user;
-    void *memory = NULL;
-    if (__atomic_fetch_sub(&g_left, 1, __ATOMIC_RELAXED) <= 0 || posix_memalign(&memory, alignment, bytes) != 0)
-        return NULL;
-    __atomic_fetch_add(&g_live, 1, __ATOMIC_RELAXED);
-    return memory;
-}
-
-static void scarce_release(void *memory, void *user)
-{
-    (void)user;
-    __atomic_fetch_sub(&g_live, 1, __ATOMIC_RELAXED);
-    free(memory);
-}
-
 // Created, moved, saved and loaded, until something fails.
 static RfResult live(const RfExemplar *exemplar, const float *velocity, float *pixels)
 {
@@ -428,24 +433,22 @@ static RfResult live(const RfExemplar *exemplar, const float *velocity, float *p
 static void any_allocation_may_fail_and_nothing_leaks_or_is_drawn(void **state)
 {
     (void)state;
-    const RfAllocator scarce = {scarce_allocate, scarce_release, NULL};
     static float velocity[2 * SIDE * SIDE], pixels[16 * 16 * 3];
     shear(velocity);
     rf_set_threads(1);
-    g_left = 1 << 30;
-    rf_set_allocator(&scarce);
+    scarce_begin(SCARCE_PLENTY);
     RfExemplar *exemplar = scene_noise_exemplar(16, 1);
-    int before = g_live, needed = 0;
+    int before = scarce_live(), needed = 0;
     RfResult result = RF_OUT_OF_MEMORY;
     for (; needed < 2000 && result != RF_OK; ++needed)
     {
-        g_left = needed;
+        scarce_allow(needed);
         result = live(exemplar, velocity, pixels);
         assert_true(result == RF_OK || result == RF_OUT_OF_MEMORY);
-        assert_int_equal(g_live, before);
+        assert_int_equal(scarce_live(), before);
     }
     rf_exemplar_destroy(exemplar);
-    rf_set_allocator(NULL);
+    scarce_end();
     rf_set_threads(0);
     assert_int_equal(result, RF_OK);
     assert_true(needed > 20);
@@ -528,6 +531,7 @@ int main(void)
         cmocka_unit_test(a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused),
         cmocka_unit_test(a_state_with_a_true_hash_and_absurd_numbers_is_refused),
         cmocka_unit_test(a_frame_swept_empty_in_one_step_is_full_again),
+        cmocka_unit_test(what_flows_in_is_renewed),
         cmocka_unit_test(what_fades_is_what_was_carried_there),
         cmocka_unit_test(a_stopped_step_changes_nothing),
         cmocka_unit_test(any_allocation_may_fail_and_nothing_leaks_or_is_drawn),

@@ -275,6 +275,17 @@ static float shortest(float step, int n)
     return step - floorf(step / (float)n + 0.5f) * (float)n;
 }
 
+// Whether a pixel lies between its nearest marker and another as far on the other side. Into a frame that tiles nothing
+// flows.
+static bool is_between(const RfMarkers *m, int x, int y, int32_t nearest)
+{
+    if (m->tiles)
+        return true;
+    int i = 2 * x - nearest % m->width, j = 2 * y - nearest / m->width;
+    int32_t other = j * m->width + i;
+    return i >= 0 && j >= 0 && i < m->width && j < m->height && m->index[other] == other;
+}
+
 static void fill_row(void *context, int y, int worker)
 {
     (void)worker;
@@ -291,6 +302,8 @@ static void fill_row(void *context, int y, int worker)
             step = (RfVec2){shortest(step.x, m->width), shortest(step.y, m->height)};
         if (nearest >= 0)
             from.source = rf_vec2_add(from.source, rf_bend(from.bend, step));
+        if (nearest >= 0 && !is_between(m, x, y, nearest))
+            from.continued += rf_vec2_length(step);
         from.at = at;
         m->pixels[own] = from;
     }
@@ -319,6 +332,24 @@ RfVec2 rf_markers_source(const RfMarkers *m, RfVec2 at)
     if (m->tiles)
         step = (RfVec2){step.x - (float)(x - px), step.y - (float)(y - py)};
     return rf_vec2_add(k->source, rf_bend(k->bend, step));
+}
+
+float rf_markers_share(const RfMarkers *m, int x, int y)
+{
+    static const int steps[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
+    float own = m->pixels[(ptrdiff_t)y * m->width + x].share, sum = 0;
+    if (own > 0)
+        return own;
+    int count = 0;
+    for (int k = 0; k < 4; ++k)
+    {
+        int i = rf_border_int(x + steps[k][0], m->width, m->tiles),
+            j = rf_border_int(y + steps[k][1], m->height, m->tiles);
+        float share = m->pixels[(ptrdiff_t)j * m->width + i].share;
+        sum += share;
+        count += share > 0;
+    }
+    return count >= 2 ? sum / (float)count : 0;
 }
 
 // Adds a place to the voice that says the same, or as a new one. `out` holds weights, and sums of places times weights

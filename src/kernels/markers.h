@@ -23,6 +23,9 @@ typedef struct RfMarker
     RfBend bend;
     /// How much of it is seen, 0 to 1; 0: there is none.
     float share;
+    /// How far the texture was continued to here from where it was laid, in pixels: where the flow enters the frame,
+    /// the more the longer ago.
+    float continued;
 } RfMarker;
 
 /// [height][width], in the pixel that they lie in: one at most in each.
@@ -64,6 +67,9 @@ typedef struct RfVoices
 } RfVoices;
 
 void rf_markers_hear(const RfMarkers *markers, int x, int y, RfVoices *out);
+
+/// The share of the pixel's marker; where it has none between two that have one, their mean.
+float rf_markers_share(const RfMarkers *markers, int x, int y);
 
 /// Where a point of the frame comes from as the marker of its pixel says, which must be there.
 RfVec2 rf_markers_source(const RfMarkers *markers, RfVec2 at);

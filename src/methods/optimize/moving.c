@@ -179,7 +179,7 @@ static void set_markers(RfOptimize *o, const RfFlowView *flow, const RfSynthesis
         RfVec2 at = {(float)(i % m->width), (float)(i / m->width)}, turn = {1, 0};
         if (o->options.orient == RF_ORIENT_FLOW)
             turn = rf_optimize_downstream(flow, m->width, m->height, at);
-        m->pixels[i] = (RfMarker){at, frame->sources[i], rf_bend_of(turn), 1};
+        m->pixels[i] = (RfMarker){at, frame->sources[i], rf_bend_of(turn), 1, 0};
     }
 }
 
@@ -296,7 +296,7 @@ static void draw_row(void *context, int y, int worker)
     for (int x = 0; x < m->width; ++x)
     {
         float *values = d->frame->pixels + y * d->frame->row_stride + (ptrdiff_t)x * d->frame->channels;
-        float share = d->o->fading.pixels[(ptrdiff_t)y * m->width + x].share, other[RF_MAX_EXEMPLAR_CHANNELS];
+        float share = rf_markers_share(&d->o->fading, x, y), other[RF_MAX_EXEMPLAR_CHANNELS];
         memset(values, 0, (size_t)d->frame->channels * sizeof *values);
         if (d->flow->mask && !rf_pixel_inside(d->flow, m->width, m->height, x, y))
             continue;

@@ -250,7 +250,8 @@ static void replace(RfOptimize *o, const RfPatch *p, int x, int y, RfVec2 step)
     if (fading->share < FRESH)
         *fading = *marker;
     fading->share = FRESH;
-    *marker = (RfMarker){{(float)x, (float)y}, rf_vec2_add(p->source, rf_turn(p->turn, step)), rf_bend_of(p->turn), 1};
+    RfVec2 at = {(float)x, (float)y}, source = rf_vec2_add(p->source, rf_turn(p->turn, step));
+    *marker = (RfMarker){at, source, rf_bend_of(p->turn), 1, 0};
 }
 
 static void lay(RfOptimize *o, const RfPatch *p)

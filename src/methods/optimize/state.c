@@ -12,7 +12,7 @@
 
 enum
 {
-    STATE_VERSION = 2
+    STATE_VERSION = 3
 };
 
 typedef struct StateHeader
@@ -45,7 +45,7 @@ typedef struct Record
 {
     RfVec2 at, source;
     RfBend bend;
-    float share;
+    float share, continued;
     int32_t pixel;
 } Record;
 
@@ -58,7 +58,10 @@ static Record *write_markers(const RfMarkers *m, Record *out)
 {
     for (int i = 0; i < m->width * m->height; ++i)
         if (m->pixels[i].share > 0)
-            *out++ = (Record){m->pixels[i].at, m->pixels[i].source, m->pixels[i].bend, m->pixels[i].share, i};
+        {
+            const RfMarker *k = &m->pixels[i];
+            *out++ = (Record){k->at, k->source, k->bend, k->share, k->continued, i};
+        }
     return out;
 }
 
@@ -133,7 +136,7 @@ static bool is_sound(const RfOptimize *o, const Record *r, size_t number, size_t
         return false;
     bool near = fabsf(r->at.x - (float)(r->pixel % width)) <= 1 && fabsf(r->at.y - (float)(r->pixel / width)) <= 1;
     return near && is_finite(r->source) && is_finite(r->bend.x) && is_finite(r->bend.y) && r->share > 0 &&
-           r->share <= 1;
+           r->share <= 1 && r->continued >= 0 && r->continued < INFINITY;
 }
 
 static RfResult restore(RfOptimize *o, const StateHeader *h, const uint8_t *rest, size_t size)
@@ -148,7 +151,7 @@ static RfResult restore(RfOptimize *o, const StateHeader *h, const uint8_t *rest
         RfMarkers *m = i < pixels ? &o->markers : &o->fading;
         if (!is_sound(o, &record, i, pixels))
             return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
-        m->pixels[record.pixel] = (RfMarker){record.at, record.source, record.bend, record.share};
+        m->pixels[record.pixel] = (RfMarker){record.at, record.source, record.bend, record.share, record.continued};
     }
     o->time = h->time;
     o->distance = h->distance;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How worn the texture is: by how much it is stretched, and turned away from how it is to lie.
+// How worn the texture is: by how much it is stretched, and turned away from how it is to lie; and, where the flow
+// enters the frame, by how far what was laid there was continued. What pieces meet at the border do so in a line along
+// the flow for as long as they are continued, and where their turns differ they run into each other.
 //
 // The texture is to lie as the options say: unturned, downstream, or as the flow has turned it. In the latter case
 // neighbours in a vortex are turned ever more unlike each other, which no texture can follow: renewed texture lies as
@@ -20,6 +22,8 @@ enum
 // from the exemplar; with more, structures are seen to be stretched.
 static const float WORN_STRETCH = 0.4f;
 static const float WORN_ANGLE = 0.5f;
+// And when it was continued by so much of a patch's reach.
+static const float CONTINUED = 0.5f;
 // The limits differ by up to this part from block to block of the exemplar, so that what was made together does not
 // wear out together.
 static const float LIMITS_DIFFER = 0.4f;
@@ -123,7 +127,8 @@ static float wear_of(const Judging *k, int cell)
     // Nearly the angle between the two: twice the sine of its half.
     float off = rf_vec2_length(rf_vec2_sub(parts.turn, turn));
     float stretch = logf(rf_max(parts.most, 1 / parts.least));
-    return rf_max(stretch / WORN_STRETCH, off / WORN_ANGLE) / limit_of(o, m->source);
+    float bent = rf_max(stretch / WORN_STRETCH, off / WORN_ANGLE);
+    return rf_max(bent, m->continued / (CONTINUED * (float)o->outer)) / limit_of(o, m->source);
 }
 
 static void judge_row(void *context, int row, int worker)
