@@ -370,7 +370,7 @@ static void doubled_places_of_a_piece_are_a_piece(void **state)
     RfSynthesisExemplar e = make_exemplar(60, 60, 1, false, 5);
     RfSynthesisFrame coarse = make_piece(&e, 14, 11, false, 3, 5, 2), fine;
     assert_int_equal(rf_synthesis_frame_create(27, 22, 1, false, &fine), RF_OK);
-    rf_synthesis_refine(&coarse, &fine);
+    rf_synthesis_refine(&coarse, NULL, &fine);
     for (int i = 0; i < 27 * 22; ++i)
         assert_true(fine.sources[i].x == (float)(6 + i % 27) && fine.sources[i].y == (float)(10 + i / 27));
     rf_synthesis_frame_free(&coarse);

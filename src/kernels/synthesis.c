@@ -89,15 +89,18 @@ void rf_synthesis_scatter(RfSynthesisFrame *frame, const RfSynthesisExemplar *ex
                                             (float)(margin + (int)rf_random_below(height, seed, 0, (uint64_t)i, 1))};
 }
 
-void rf_synthesis_refine(const RfSynthesisFrame *coarse, RfSynthesisFrame *fine)
+void rf_synthesis_refine(const RfSynthesisFrame *coarse, const RfVec2 *turns, RfSynthesisFrame *fine)
 {
     for (int y = 0; y < fine->height; ++y)
         for (int x = 0; x < fine->width; ++x)
         {
             size_t from = (size_t)rf_min_int(y / 2, coarse->height - 1) * (size_t)coarse->width +
                           (size_t)rf_min_int(x / 2, coarse->width - 1);
-            fine->sources[(ptrdiff_t)y * fine->width + x] =
-                (RfVec2){2 * coarse->sources[from].x + (float)(x & 1), 2 * coarse->sources[from].y + (float)(y & 1)};
+            size_t pixel = (size_t)y * (size_t)fine->width + (size_t)x;
+            // From the middle of the coarse pixel, which lies between four of the fine ones, in frame and exemplar.
+            RfVec2 step = {(float)(x & 1) - 0.5f, (float)(y & 1) - 0.5f};
+            RfVec2 middle = {2 * coarse->sources[from].x + 0.5f, 2 * coarse->sources[from].y + 0.5f};
+            fine->sources[pixel] = rf_vec2_add(middle, turns ? rf_turn(turns[pixel], step) : step);
         }
 }
 
@@ -107,12 +110,6 @@ typedef struct Show
     const RfSynthesisExemplar *exemplar;
     int channels;
 } Show;
-
-static int nearest_pixel(float at, int n, bool tiles)
-{
-    int i = (int)floorf(at + 0.5f);
-    return rf_border_int(i, n, tiles);
-}
 
 static void show_row(void *context, int y, int worker)
 {
@@ -125,8 +122,7 @@ static void show_row(void *context, int y, int worker)
         if (!e->tiles) // a level of odd size is not quite half the next one
             *source =
                 (RfVec2){rf_clamp(source->x, 0, (float)(e->width - 1)), rf_clamp(source->y, 0, (float)(e->height - 1))};
-        int u = nearest_pixel(source->x, e->width, e->tiles), v = nearest_pixel(source->y, e->height, e->tiles);
-        memcpy(rf_fixed_at(&s->frame->picture, x, y), rf_fixed_at(&e->fixed, u, v),
+        memcpy(rf_fixed_at(&s->frame->picture, x, y), rf_synthesis_pixel(e, *source),
                (size_t)s->channels * sizeof(int16_t));
     }
 }

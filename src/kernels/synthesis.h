@@ -7,6 +7,7 @@
 // (k-coherent candidates; a pixel becomes one of the candidates, not their mean).
 #pragma once
 
+#include "core/maths.h"
 #include "kernels/fixed_picture.h"
 #include "kernels/neighbours.h"
 #include "kernels/similar.h"
@@ -73,6 +74,14 @@ static inline RfVec2 rf_turn_back(RfVec2 turn, RfVec2 step)
     return rf_turn((RfVec2){turn.x / square, -turn.y / square}, step);
 }
 
+/// The exemplar's pixel nearest to a place; beyond a border its last one, or round the other side where it tiles.
+static inline const int16_t *rf_synthesis_pixel(const RfSynthesisExemplar *exemplar, RfVec2 place)
+{
+    int x = (int)floorf(place.x + 0.5f), y = (int)floorf(place.y + 0.5f);
+    return rf_fixed_at(&exemplar->fixed, rf_border_int(x, exemplar->width, exemplar->tiles),
+                       rf_border_int(y, exemplar->height, exemplar->tiles));
+}
+
 /// Takes over `pixels`, also on failure. coarse: the level of half the size, or NULL. similar: places a list.
 RfResult rf_synthesis_exemplar_create(float *pixels, int width, int height, int channels, bool tiles, float scale,
                                       int similar, const RfSynthesisExemplar *coarse, RfSynthesisExemplar *out);
@@ -95,8 +104,8 @@ static inline RfVec2 rf_synthesis_cell_middle(const RfSynthesisFrame *frame, int
 void rf_synthesis_place(RfSynthesisFrame *frame, const RfVec2 *turns);
 /// Every window starts at a random place of the exemplar.
 void rf_synthesis_scatter(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int side, uint64_t seed);
-/// Doubles the sources of a coarser frame.
-void rf_synthesis_refine(const RfSynthesisFrame *coarse, RfSynthesisFrame *fine);
+/// Doubles the sources of a coarser frame. turns: of the finer one's pixels, as above.
+void rf_synthesis_refine(const RfSynthesisFrame *coarse, const RfVec2 *turns, RfSynthesisFrame *fine);
 /// Sets the picture from the sources, but for its last `guides` channels.
 void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int guides);
 
@@ -152,7 +161,8 @@ typedef struct RfSynthesisAssign
     bool mean;
     /// Windows that fit badly count less (energy with r = 0.8; else r = 2).
     bool robust;
-    /// Offsets that differ by up to this, in exemplar pixels, are one: their mean is taken. 0 for still pictures.
+    /// Places that differ by up to this, in exemplar pixels, count as one: that of the heaviest window. 0 where nothing
+    /// is turned or scaled.
     float together;
     /// Cells where nothing has changed too.
     bool all;

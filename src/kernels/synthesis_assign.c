@@ -41,9 +41,9 @@ typedef struct Ballot
 {
     int votes, groups;
     Vote vote[MAX_VOTES];
-    /// Of each group at one pixel: its weight and the sum of its places.
-    float weight[MAX_VOTES];
-    RfVec2 sum[MAX_VOTES];
+    /// Of each group at one pixel: its weight, that of its heaviest vote, and the place that this one is for.
+    float weight[MAX_VOTES], heaviest[MAX_VOTES];
+    RfVec2 place[MAX_VOTES];
     const int16_t *pixel[MAX_VOTES];
 } Ballot;
 
@@ -53,6 +53,8 @@ typedef struct Assigning
     int reach, channels;
     float half, smallest_cost;
     float fall[MAX_FALL];
+    /// Of windows.
+    float *weights;
     Ballot *ballots;
 } Assigning;
 
@@ -66,15 +68,23 @@ static void make_fall(Assigning *a, int side)
     }
 }
 
+static void weigh_row(void *context, int row, int worker)
+{
+    (void)worker;
+    const Assigning *a = context;
+    const RfSynthesisFrame *f = a->assign->frame;
+    for (int i = row * f->columns; i < (row + 1) * f->columns; ++i)
+        a->weights[i] = a->assign->robust ? powf(f->windows[i].cost + a->smallest_cost, (ROBUST_EXPONENT - 2) / 2) : 1;
+}
+
 // A window with a place for the cell's middle joins the group of one that says the same; else it opens a group.
 static void count_in(const Assigning *a, Ballot *b, const RfSynthesisWindow *window, RfVec2 shift, RfVec2 *middles,
                      RfVec2 middle)
 {
     float together = a->assign->together;
     Vote *vote = &b->vote[b->votes++];
-    *vote = (Vote){rf_vec2_add(window->at, shift), window->source, window->turn, 1, 0};
-    if (a->assign->robust)
-        vote->weight = powf(window->cost + a->smallest_cost, (ROBUST_EXPONENT - 2) / 2);
+    float weight = a->weights[window - a->assign->frame->windows];
+    *vote = (Vote){rf_vec2_add(window->at, shift), window->source, window->turn, weight, 0};
     RfVec2 place = rf_vec2_add(vote->source, rf_turn(vote->turn, rf_vec2_sub(middle, vote->at)));
     int g = 0;
     while (g < b->groups && !(fabsf(middles[g].x - place.x) <= together && fabsf(middles[g].y - place.y) <= together))
@@ -108,14 +118,6 @@ static bool source_inside(const RfSynthesisExemplar *e, RfVec2 s)
     return e->tiles || (s.x >= -0.5f && s.y >= -0.5f && s.x < (float)e->width - 0.5f && s.y < (float)e->height - 0.5f);
 }
 
-static const int16_t *exemplar_pixel(const RfSynthesisExemplar *e, RfVec2 s)
-{
-    int u = (int)floorf(s.x + 0.5f), v = (int)floorf(s.y + 0.5f);
-    if (e->tiles)
-        u = rf_wrap_int(u, e->width), v = rf_wrap_int(v, e->height);
-    return rf_fixed_at(&e->fixed, u, v);
-}
-
 static float weigh(const Assigning *a, const Vote *vote, float x, float y)
 {
     float dx = fabsf(x - vote->at.x), dy = fabsf(y - vote->at.y);
@@ -131,7 +133,7 @@ static float count_votes(const Assigning *a, Ballot *b, int x, int y)
     for (int g = 0; g < b->groups; ++g)
     {
         b->weight[g] = 0;
-        b->sum[g] = (RfVec2){0, 0};
+        b->heaviest[g] = 0;
     }
     for (int i = 0; i < b->votes; ++i)
     {
@@ -141,18 +143,17 @@ static float count_votes(const Assigning *a, Ballot *b, int x, int y)
         RfVec2 place = rf_vec2_add(vote->source, rf_turn(vote->turn, step));
         if (weight == 0 || !source_inside(a->assign->exemplar, place))
             continue;
+        // Not the mean of the places: between two pieces that differ by part of a pixel it would lead from one to the
+        // other little by little, and make both of them unlike the exemplar.
+        if (weight > b->heaviest[vote->group])
+        {
+            b->heaviest[vote->group] = weight;
+            b->place[vote->group] = place;
+        }
         b->weight[vote->group] += weight;
-        b->sum[vote->group].x += weight * place.x;
-        b->sum[vote->group].y += weight * place.y;
         total += weight;
     }
     return total;
-}
-
-static RfVec2 place_of(const Ballot *b, int group)
-{
-    RfVec2 place = {b->sum[group].x / b->weight[group], b->sum[group].y / b->weight[group]};
-    return place;
 }
 
 // The mean of all votes, and of what the pixel is held to.
@@ -164,7 +165,7 @@ static void mean_of_votes(const Assigning *a, Ballot *b, int x, int y, float tot
     for (int g = 0; g < b->groups; ++g)
         if (b->weight[g] > 0)
         {
-            b->pixel[g] = exemplar_pixel(assign->exemplar, place_of(b, g));
+            b->pixel[g] = rf_synthesis_pixel(assign->exemplar, b->place[g]);
             for (int c = 0; c < a->channels; ++c)
                 mean[c] += b->weight[g] / total * b->pixel[g][c];
         }
@@ -198,18 +199,10 @@ static int nearest_group(const Assigning *a, const Ballot *b, const float *mean)
 
 static bool set_source(RfVec2 *source, RfVec2 place)
 {
-    // Whole places are sums of whole numbers over sums of weights.
+    // Turned windows of one piece say the same but for rounding.
     bool other = fabsf(source->x - place.x) > 1e-3f || fabsf(source->y - place.y) > 1e-3f;
     *source = place;
     return other;
-}
-
-// Means of equal places are equal to them only but for rounding: they are brought to whole pixels, or where places are
-// no whole pixels to 1/256 of one.
-static RfVec2 snap(const Assigning *a, RfVec2 place)
-{
-    float steps = a->assign->together > 0 ? 256 : 1;
-    return (RfVec2){floorf(place.x * steps + 0.5f) / steps, floorf(place.y * steps + 0.5f) / steps};
 }
 
 // Returns true if the pixel became another.
@@ -223,8 +216,7 @@ static bool assign_pixel(const Assigning *a, Ballot *b, int x, int y)
     mean_of_votes(a, b, x, y, total, mean);
     int16_t *pixel = rf_fixed_at(&assign->frame->picture, x, y);
     int best = nearest_group(a, b, mean);
-    bool other =
-        set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], snap(a, place_of(b, best)));
+    bool other = set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], b->place[best]);
     for (int c = 0; c < a->channels && (assign->mean || assign->held); ++c)
     {
         float hold = assign->held ? assign->hold[(ptrdiff_t)y * assign->frame->width + x] : 0;
@@ -241,27 +233,22 @@ static bool assign_pixel(const Assigning *a, Ballot *b, int x, int y)
     return other;
 }
 
-// Where the middle of a cell comes from, if all windows over it say much the same: their mean, and the mean turn.
-static RfVec2 agreed_place(const Assigning *a, const Ballot *b, RfVec2 middle, RfVec2 *turn)
+// The window that says most about a point.
+static const Vote *heaviest_vote(const Assigning *a, const Ballot *b, RfVec2 point)
 {
-    if (a->assign->together == 0)
+    const Vote *heaviest = b->vote;
+    float most = 0;
+    bool equal = a->assign->together == 0; // nothing is turned: votes of one group are for exactly one place
+    for (int i = 0; i < b->votes && !equal; ++i)
     {
-        *turn = (RfVec2){1, 0};
-        return rf_vec2_add(b->vote[0].source, rf_vec2_sub(middle, b->vote[0].at));
+        float weight = weigh(a, &b->vote[i], point.x, point.y);
+        if (weight > most)
+        {
+            most = weight;
+            heaviest = &b->vote[i];
+        }
     }
-    RfVec2 place = {0, 0}, turns = {0, 0};
-    float total = 1e-30f;
-    for (int i = 0; i < b->votes; ++i)
-    {
-        const Vote *vote = &b->vote[i];
-        float weight = weigh(a, vote, middle.x, middle.y);
-        RfVec2 said = rf_vec2_add(vote->source, rf_turn(vote->turn, rf_vec2_sub(middle, vote->at)));
-        place = (RfVec2){place.x + weight * said.x, place.y + weight * said.y};
-        turns = (RfVec2){turns.x + weight * vote->turn.x, turns.y + weight * vote->turn.y};
-        total += weight;
-    }
-    *turn = (RfVec2){turns.x / total, turns.y / total};
-    return (RfVec2){place.x / total, place.y / total};
+    return heaviest;
 }
 
 // All windows say the same, and nothing else is asked for: the cell is a piece of the exemplar.
@@ -269,17 +256,16 @@ static bool copy_cell(const Assigning *a, const Ballot *b, int x0, int y0, int x
 {
     const RfSynthesisAssign *assign = a->assign;
     bool other = false;
-    RfVec2 middle = {0.5f * (float)(x0 + x1 - 1), 0.5f * (float)(y0 + y1 - 1)}, turn;
-    RfVec2 agreed = agreed_place(a, b, middle, &turn);
+    const Vote *vote = heaviest_vote(a, b, (RfVec2){0.5f * (float)(x0 + x1 - 1), 0.5f * (float)(y0 + y1 - 1)});
     for (int y = y0; y < y1; ++y)
         for (int x = x0; x < x1; ++x)
         {
-            RfVec2 step = {(float)x - middle.x, (float)y - middle.y};
-            RfVec2 place = snap(a, rf_vec2_add(agreed, rf_turn(turn, step)));
+            RfVec2 step = {(float)x - vote->at.x, (float)y - vote->at.y};
+            RfVec2 place = rf_vec2_add(vote->source, rf_turn(vote->turn, step));
             if (!source_inside(assign->exemplar, place))
                 continue;
             other |= set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], place);
-            memcpy(rf_fixed_at(&assign->frame->picture, x, y), exemplar_pixel(assign->exemplar, place),
+            memcpy(rf_fixed_at(&assign->frame->picture, x, y), rf_synthesis_pixel(assign->exemplar, place),
                    (size_t)a->channels * sizeof(int16_t));
         }
     return other;
@@ -327,21 +313,25 @@ RfResult rf_synthesis_assign(const RfSynthesisAssign *assign)
     int half = assign->side / 2, numbers = assign->side * assign->side * assign->exemplar->channels;
     Assigning *a = rf_allocate_zero(1, sizeof *a);
     Ballot *ballots = rf_allocate((size_t)rf_threads(), sizeof *ballots);
-    RfResult result = a && ballots ? RF_OK : RF_OUT_OF_MEMORY;
+    float *weights = rf_allocate((size_t)f->columns * (size_t)f->rows, sizeof *weights);
+    RfResult result = a && ballots && weights ? RF_OK : RF_OUT_OF_MEMORY;
     if (result == RF_OK)
     {
         a->assign = assign;
         a->ballots = ballots;
+        a->weights = weights;
         a->reach = (half + f->spacing - 1) / f->spacing;
         a->half = (float)half + 0.5f;
         a->channels = assign->exemplar->channels - assign->guides;
         a->smallest_cost = (float)numbers * LEAST_DIFFERENCE * LEAST_DIFFERENCE;
         assert((2 * a->reach + 1) * (2 * a->reach + 1) <= MAX_VOTES);
         make_fall(a, assign->side);
+        rf_parallel_for(f->rows, weigh_row, a);
         rf_parallel_for(f->rows, assign_row, a);
         rf_fixed_extend(&f->picture, f->tiles);
     }
     rf_release(a);
     rf_release(ballots);
+    rf_release(weights);
     return result;
 }

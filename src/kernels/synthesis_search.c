@@ -76,6 +76,8 @@ static float bring_inside(float at, int n, int half, bool tiles)
 {
     if (!tiles)
         return rf_clamp(at, (float)half, (float)(n - 1 - half));
+    if (at >= -0.5f && at < (float)n - 0.5f)
+        return at;
     at -= floorf((at + 0.5f) / (float)n) * (float)n;
     // A little under -1/2 is rounded to n - 1/2, whose pixel would be n.
     return at >= (float)n - 0.5f ? at - (float)n : rf_max(at, -0.5f);
@@ -92,7 +94,7 @@ static void add(const Walk *walk, Candidates *c, RfVec2 place)
     const RfSynthesisExemplar *e = walk->search->exemplar;
     place = (RfVec2){bring_inside(place.x, e->width, walk->half, e->tiles),
                      bring_inside(place.y, e->height, walk->half, e->tiles)};
-    int x = whole(place.x), y = whole(place.y);
+    int x = (int)(place.x + 0.5f), y = (int)(place.y + 0.5f); // nothing to be rounded is below 0
     uint32_t key = 1 + (uint32_t)y * (uint32_t)e->width + (uint32_t)x;
     uint32_t slot = key * 2654435761u >> 23;
     for (; c->table[slot]; slot = (slot + 1) % TABLE)
@@ -156,19 +158,40 @@ static void add_coherent(const Walk *walk, Candidates *c, const RfSynthesisWindo
         }
 }
 
+// What is seen at a point between pixels: the exemplar where the point comes from, as the nearest pixel tells it, and
+// what makes that pixel differ from the exemplar (a target, a mean). So a window that is one piece of the exemplar is
+// seen as it is, however it is turned; from the nearest pixels alone it would be jagged, and smooth places would fit
+// it better than its own.
+static void see(const Walk *walk, RfVec2 turn, RfVec2 point, int16_t *out)
+{
+    const RfSynthesisFrame *f = walk->search->frame;
+    const RfSynthesisExemplar *e = walk->search->exemplar;
+    int x = whole(point.x), y = whole(point.y);
+    int px = rf_border_int(x, f->width, f->tiles), py = rf_border_int(y, f->height, f->tiles);
+    const int16_t *pixel = rf_fixed_at(&f->picture, px, py);
+    if (walk->search->plain)
+    {
+        memcpy(out, pixel, (size_t)f->picture.channels * sizeof *out);
+        return;
+    }
+    RfVec2 source = f->sources[(ptrdiff_t)py * f->width + px];
+    // Beyond the frame goes on what is at its border.
+    RfVec2 from = f->tiles ? (RfVec2){(float)x, (float)y} : (RfVec2){(float)px, (float)py};
+    RfVec2 rest = rf_turn(turn, rf_vec2_sub(point, from));
+    const int16_t *own = rf_synthesis_pixel(e, source);
+    const int16_t *there = rf_synthesis_pixel(e, rf_vec2_add(source, rest));
+    for (int c = 0; c < f->picture.channels; ++c)
+        out[c] = (int16_t)rf_clamp_int(there[c] + pixel[c] - own[c], -RF_FIXED_RANGE / 2, RF_FIXED_RANGE / 2);
+}
+
 // The window's pixels, turned back into the exemplar's frame.
 static void gather(const Walk *walk, const RfSynthesisWindow *window, RfVec2 at, int16_t *out)
 {
-    const RfSynthesisFrame *f = walk->search->frame;
-    int channels = f->picture.channels;
     for (int j = -walk->half; j <= walk->half; ++j)
-        for (int i = -walk->half; i <= walk->half; ++i, out += channels)
+        for (int i = -walk->half; i <= walk->half; ++i, out += walk->search->frame->picture.channels)
         {
-            RfVec2 point = rf_vec2_add(at, rf_turn_back(window->turn, (RfVec2){(float)i, (float)j}));
-            memcpy(out,
-                   rf_fixed_at(&f->picture, rf_border_int(whole(point.x), f->width, f->tiles),
-                               rf_border_int(whole(point.y), f->height, f->tiles)),
-                   (size_t)channels * sizeof *out);
+            RfVec2 step = rf_turn_back(window->turn, (RfVec2){(float)i, (float)j});
+            see(walk, window->turn, rf_vec2_add(at, step), out);
         }
 }
 
@@ -268,6 +291,25 @@ static void set_penalties(const Walk *walk, float *penalties)
     rf_synthesis_penalties(s->exemplar, s->windows, s->side, s->prices, unit, s->variations, VARIATION_PART, penalties);
 }
 
+// The place between pixels that a match is: that which the window or one of its pixels tells of, if it is the same
+// pixel, so that windows of one piece stay one to a part of a pixel. Else as far from its pixel as the window was.
+static RfVec2 place_of_match(const Walk *walk, const RfSynthesisWindow *window, RfVec2 at, RfWindowPlace match)
+{
+    Candidates *c = &walk->scratch->candidates;
+    RfVec2 own = rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at)));
+    int x = match.x + walk->half, y = match.y + walk->half;
+    RfVec2 place = {(float)x + own.x - (float)whole(own.x), (float)y + own.y - (float)whole(own.y)};
+    if (walk->search->plain)
+        return place;
+    add(walk, c, own);
+    add_coherent(walk, c, window, at);
+    for (int i = 0; i < c->count; ++i)
+        if (whole(c->places[i].x) == x && whole(c->places[i].y) == y)
+            place = c->places[i];
+    forget(c);
+    return place;
+}
+
 static RfResult search_batch(Walk *walk, int count, const float *penalties, RfWindowMatch *matches)
 {
     RfWindowQueries queries = {.count = count, .windows = walk->windows, .penalties = penalties};
@@ -278,10 +320,7 @@ static RfResult search_batch(Walk *walk, int count, const float *penalties, RfWi
     {
         RfSynthesisWindow *window = &walk->search->frame->windows[walk->list[walk->first + i]];
         RfVec2 at = compared_at(walk, window);
-        RfVec2 own = rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at)));
-        // The picture shows whole pixels of the exemplar where its sources lie between them.
-        RfVec2 place = {(float)(matches[i].place.x + walk->half) + own.x - (float)whole(own.x),
-                        (float)(matches[i].place.y + walk->half) + own.y - (float)whole(own.y)};
+        RfVec2 place = place_of_match(walk, window, at, matches[i].place);
         settle(window, at, place, matches[i].distance * unit);
         walk->sums[0][0] += (double)window->cost;
         walk->sums[0][1] += (double)window->cost;

@@ -413,7 +413,7 @@ static RfResult start_level(Still *s, bool start)
     RfSynthesisFrame fine;
     RF_TRY(rf_synthesis_frame_create(b->width, b->height, m->channels, s->options->tile, &fine));
     if (!start)
-        rf_synthesis_refine(&s->frame, &fine);
+        rf_synthesis_refine(&s->frame, b->turns, &fine);
     rf_synthesis_frame_free(&s->frame);
     s->frame = fine;
     rf_release(s->prices);
