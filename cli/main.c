@@ -50,6 +50,12 @@ enum
     VERB_COUNT = sizeof g_verbs / sizeof g_verbs[0]
 };
 
+const Verb *verb_table(int *count)
+{
+    *count = VERB_COUNT;
+    return g_verbs;
+}
+
 static int unknown_verb(const char *word)
 {
     char names[256] = "";

@@ -25,10 +25,17 @@ static int keep_method_option(Settings *settings, const RfOption *option, const 
     return CODE_DONE;
 }
 
-static int unknown_option(const Verb *verb, const char *word)
+/// elsewhere: other verbs that have it.
+static int unknown_option(const Verb *verb, const char *word, unsigned elsewhere)
 {
-    return fail(CODE_USAGE, NULL, NULL, "%s has no option %s; riffle %s --help lists them", verb->name, word,
-                verb->name);
+    char names[128] = "";
+    int count = 0;
+    const Verb *verbs = verb_table(&count);
+    for (int i = 0; i < count; ++i)
+        if (verbs[i].bit & elsewhere)
+            snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", names[0] ? ", " : "", verbs[i].name);
+    return fail(CODE_USAGE, NULL, NULL, "%s has no option %s%s%s%s; riffle %s --help lists them", verb->name, word,
+                names[0] ? " (" : "", names, names[0] ? " has)" : "", verb->name);
 }
 
 /// The text after '=' or the next word.
@@ -58,12 +65,13 @@ static const RfOption *verb_option(const Verb *verb, const char *name)
     return NULL;
 }
 
-static int parse_method_option(Parser *parser, const char *word, const char *name, const char *equals)
+static int parse_method_option(Parser *parser, const char *word, const char *name, const char *equals,
+                               unsigned elsewhere)
 {
     const Verb *verb = parser->settings->verb;
     const RfOption *option = verb->table ? verb_option(verb, name) : NULL;
     if (!option && (verb->bit != VERB_TEXTURE || !method_with_option(name, &option)))
-        return unknown_option(verb, word);
+        return unknown_option(verb, word, method_with_option(name, &option) ? VERB_TEXTURE : elsewhere);
     const char *value = equals ? equals + 1 : "yes";
     if (option->kind != RF_OPTION_BOOL)
     {
@@ -82,7 +90,11 @@ static int parse_option(Parser *parser, const char *word, const GenericOption *o
                         const char *equals)
 {
     if (!option || !(option->verbs & parser->settings->verb->bit))
-        return name ? parse_method_option(parser, word, name, equals) : unknown_option(parser->settings->verb, word);
+    {
+        unsigned elsewhere = option ? option->verbs : 0;
+        return name ? parse_method_option(parser, word, name, equals, elsewhere)
+                    : unknown_option(parser->settings->verb, word, elsewhere);
+    }
     const char *value = NULL;
     int code = option->value ? take_value(parser, word, equals, option->value, &value) : refuse_value(name, equals);
     return code ? code : option->set(parser->settings, value);
@@ -94,7 +106,7 @@ static int parse_long(Parser *parser, const char *word)
     const char *equals = strchr(word, '=');
     size_t length = equals ? (size_t)(equals - word) - 2 : strlen(word) - 2;
     if (length >= sizeof name)
-        return unknown_option(parser->settings->verb, word);
+        return unknown_option(parser->settings->verb, word, 0);
     memcpy(name, word + 2, length);
     name[length] = '\0';
     return parse_option(parser, word, generic_option(name, 0), name, equals);
@@ -141,8 +153,10 @@ static int check_words(const Settings *settings)
         return fail(CODE_USAGE, NULL, NULL, "%s needs %s: %d of %d %s given; riffle %s --help tells more", verb->name,
                     verb->usage, count, verb->words, count == 1 ? "is" : "are", verb->name);
     if (count > verb->words && !verb->more)
-        return fail(CODE_USAGE, NULL, NULL, "%s takes %s and no more, but \"%s\" is left; quote patterns", verb->name,
-                    verb->usage, settings->words[verb->words]);
+        return fail(CODE_USAGE, NULL, NULL, "%s takes %s and no more, but \"%s\" is left; quote patterns%s", verb->name,
+                    verb->usage, settings->words[verb->words],
+                    text_choice("yes|no", settings->words[verb->words]) >= 0 ? ", and join yes and no as in --tile=no"
+                                                                             : "");
     return CODE_DONE;
 }
 

@@ -135,6 +135,9 @@ typedef struct Settings
     const char *fixed, *target, *guide, *orientation_map, *scale_map;
 } Settings;
 
+/// All verbs there are.
+const Verb *verb_table(int *count);
+
 /// Fills the settings from the words after the verb.
 int settings_parse(Settings *settings, const Verb *verb, int count, char **words);
 /// The method's options: its preset, then --seed and --fps, then its own.

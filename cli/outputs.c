@@ -26,7 +26,7 @@ static int refuse_folder(const char *path, const char *extension)
                 extension);
 }
 
-static int find_kind(Output *output, bool flows)
+static int find_kind(Output *output, bool flows, bool still)
 {
     const char *text = output->text;
     if (is_folder(text))
@@ -45,6 +45,8 @@ static int find_kind(Output *output, bool flows)
         return fail(CODE_USAGE, text, NULL,
                     "a flow is written as flo, npy, exr or vti, to null: or md5:; riffle render "
                     "makes pictures of it");
+    else if (still)
+        return fail(CODE_USAGE, text, NULL, "a still texture is one picture: png, exr, npy, null:, md5: or -");
     else
         return fail(CODE_USAGE, text, NULL,
                     "frames are written as png, exr, npy (out.%%04d.png), mp4, webm, mov, gif, "
@@ -98,7 +100,7 @@ int outputs_open(Outputs *outputs, const Settings *settings, const char *destina
         outputs->list[outputs->count++].text = settings->outputs[i];
     for (int i = 0; i < outputs->count; ++i)
     {
-        int code = find_kind(&outputs->list[i], flows);
+        int code = find_kind(&outputs->list[i], flows, outputs->settings->verb->bit == VERB_SYNTH);
         if (code)
             return code;
     }

@@ -170,7 +170,8 @@ static int open_texture(Texture *texture, const Settings *settings)
     texture->width = settings->width ? settings->width : texture->flow.info.width;
     texture->height = settings->height ? settings->height : texture->flow.info.height;
     RfResult result = texture->method->create(texture->exemplar.exemplar, &texture->options, &texture->state);
-    return result == RF_OK ? CODE_DONE : fail_result(result, settings->words[1]);
+    // An option that the method refuses is not the exemplar's fault.
+    return result == RF_OK ? CODE_DONE : fail_result(result, result == RF_INVALID_ARGUMENT ? NULL : settings->words[1]);
 }
 
 static void tell_texture(const Texture *texture, const FramePlan *plan)
