@@ -7,6 +7,7 @@
 // CSV: threads,side,pixels,seconds (median of runs),ns a pixel. Then, in lines with #, the law a + b pixels that comes
 // nearest in proportion: a is the exemplar's own share, b the price of a pixel, and how far the times are from it says
 // whether the cost is linear. The plot has both axes logarithmic, so that b pixels alone is a dashed line of slope 1.
+#include "bench.h"
 #include "riffle/riffle.h"
 
 #include <math.h>
@@ -14,7 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum
 {
@@ -29,27 +29,6 @@ typedef struct Settings
     const char *exemplar, *plot;
     int runs, largest;
 } Settings;
-
-static void require(RfResult result)
-{
-    if (result == RF_OK)
-        return;
-    fprintf(stderr, "bench_cost: %s: %s\n", rf_last_error()->file, rf_last_error()->message);
-    exit(1);
-}
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 static int side_of(int size)
 {
@@ -68,17 +47,16 @@ static double seconds_of_one(const RfExemplar *exemplar, int side, int channels,
     double times[MAX_RUNS];
     RfOptimizeOptions options = rf_optimize_defaults();
     RfImage *out;
-    require(rf_image_create(side, side, channels, &out));
+    bench_require(rf_image_create(side, side, channels, &out));
     RfImageView view = rf_image_view(out);
     for (int r = 0; r < runs; ++r)
     {
-        double start = now();
-        require(rf_optimize_still(exemplar, &options, NULL, &view));
-        times[r] = now() - start;
+        double start = bench_now();
+        bench_require(rf_optimize_still(exemplar, &options, NULL, &view));
+        times[r] = bench_now() - start;
     }
     rf_image_destroy(out);
-    qsort(times, (size_t)runs, sizeof *times, by_size);
-    return times[runs / 2];
+    return 1e-3 * bench_median(times, runs);
 }
 
 // Fills seconds[threads - 1][size] and prints it; returns how many sizes there are.
@@ -89,9 +67,9 @@ static int measure(const Settings *s, double seconds[THREADS][SIZES])
     RfExemplar *exemplar;
     int count = 0;
     snprintf(name, sizeof name, "%s?size=%d", s->exemplar, FROM);
-    require(rf_image_read(name, &image));
+    bench_require(rf_image_read(name, &image));
     RfMapView map = {"colour", RF_MAP_COLOUR, rf_image_view(image), 1};
-    require(rf_exemplar_create(&map, 1, RF_TILING_NO, &exemplar));
+    bench_require(rf_exemplar_create(&map, 1, RF_TILING_NO, &exemplar));
     printf("threads,side,pixels,seconds,ns a pixel\n");
     for (; count < SIZES && side_of(count) <= s->largest; ++count)
         for (int t = 0; t < THREADS; ++t)
@@ -265,15 +243,15 @@ int main(int argc, char **argv)
     double seconds[THREADS][SIZES];
     for (int i = 1; i < argc; ++i)
     {
-        char *value = strchr(argv[i], '=');
-        if (value && strncmp(argv[i], "runs=", 5) == 0)
-            s.runs = atoi(value + 1);
-        else if (value && strncmp(argv[i], "exemplar=", 9) == 0)
-            s.exemplar = value + 1;
-        else if (value && strncmp(argv[i], "largest=", 8) == 0)
-            s.largest = atoi(value + 1);
-        else if (value && strncmp(argv[i], "plot=", 5) == 0)
-            s.plot = value + 1;
+        const char *value;
+        if ((value = bench_value(argv[i], "runs")))
+            s.runs = atoi(value);
+        else if ((value = bench_value(argv[i], "exemplar")))
+            s.exemplar = value;
+        else if ((value = bench_value(argv[i], "largest")))
+            s.largest = atoi(value);
+        else if ((value = bench_value(argv[i], "plot")))
+            s.plot = value;
         else
             return fprintf(stderr, "bench_cost: no argument called %s\n", argv[i]), 2;
     }

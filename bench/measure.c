@@ -4,33 +4,18 @@
 //
 //   bench_measure [size=256] [exemplar=256]
 
+#include "bench.h"
 #include "riffle/riffle.h"
 #include "support/scenes.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum
 {
     STEPS = 4
 };
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
-
-static void check(RfResult result)
-{
-    if (result == RF_OK)
-        return;
-    fprintf(stderr, "bench_measure: %s\n", rf_last_error()->message);
-    exit(1);
-}
 
 typedef struct Inputs
 {
@@ -57,13 +42,13 @@ static double least_step(const Inputs *in, RfMeasureOptions options)
     RfMeasure *measure;
     RfMeasureFrame result;
     double least = 1e30;
-    check(rf_measure_create(&in->exemplar, &options, &measure));
+    bench_require(rf_measure_create(&in->exemplar, &options, &measure));
     for (int i = 0; i < STEPS; ++i)
     {
         RfFlowView flow = {.width = in->frame.width, .height = in->frame.height, .velocity = in->velocity, .time = i};
-        double start = now();
-        check(rf_measure_step(measure, &flow, NULL, &in->frame, &result));
-        double took = now() - start;
+        double start = bench_now();
+        bench_require(rf_measure_step(measure, &flow, NULL, &in->frame, &result));
+        double took = bench_now() - start;
         // The first step has no predecessor, and prepares.
         least = i > 0 && took < least ? took : least;
     }

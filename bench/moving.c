@@ -6,12 +6,12 @@
 // CSV: flow,exemplar,threads,first ms,ms (median after the first),worst ms,carry,renew,draw (medians),patches a frame.
 // The flows are built in: vortex, turbulence, cylinder; without exemplar= lava and pebbles of 256 x 256. The machine
 // may be shared, so compare figures of one run only.
+#include "bench.h"
 #include "riffle/riffle.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum
 {
@@ -32,27 +32,6 @@ typedef struct Times
     double first, patches, of[STAGES][MAX_FRAMES];
 } Times;
 
-static void require(RfResult result)
-{
-    if (result == RF_OK)
-        return;
-    fprintf(stderr, "bench_moving: %s: %s\n", rf_last_error()->file, rf_last_error()->message);
-    exit(1);
-}
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void keep(Times *times, const RfOptimize *optimize, double seconds)
 {
     RfOptimizeStats stats = rf_optimize_stats(optimize);
@@ -67,15 +46,15 @@ static void run(const Settings *s, RfFlow *flow, const RfExemplar *exemplar, con
 {
     RfOptimizeOptions options = rf_optimize_defaults();
     RfOptimize *optimize;
-    require(rf_optimize_create(exemplar, &options, &optimize));
+    bench_require(rf_optimize_create(exemplar, &options, &optimize));
     *times = (Times){0};
     for (int f = 0; f < s->frames; ++f)
     {
         RfFlowView view;
-        require(rf_flow_at(flow, rf_flow_info(flow).first_frame + f, &view));
-        double start = now();
-        require(rf_optimize_step(optimize, &view, frame));
-        double seconds = now() - start;
+        bench_require(rf_flow_at(flow, rf_flow_info(flow).first_frame + f, &view));
+        double start = bench_now();
+        bench_require(rf_optimize_step(optimize, &view, frame));
+        double seconds = 1e-3 * (bench_now() - start);
         if (f == 0)
             times->first = seconds;
         else
@@ -87,7 +66,7 @@ static void run(const Settings *s, RfFlow *flow, const RfExemplar *exemplar, con
 static void print(const char *flow, const char *exemplar, int threads, Times *times)
 {
     for (int i = 0; i < STAGES; ++i)
-        qsort(times->of[i], (size_t)times->count, sizeof(double), by_size);
+        qsort(times->of[i], (size_t)times->count, sizeof(double), bench_by_size);
     int last = times->count - 1, middle = times->count / 2;
     printf("%s,%s,%d,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f\n", flow, exemplar, threads, 1e3 * times->first,
            1e3 * times->of[0][middle], 1e3 * times->of[0][last], 1e3 * times->of[1][middle], 1e3 * times->of[2][middle],
@@ -101,10 +80,10 @@ static void measure(const Settings *s, const char *flow_name, const char *exempl
     char path[128];
     RfImage *image, *frame;
     RfExemplar *exemplar;
-    require(rf_image_read(exemplar_name, &image));
+    bench_require(rf_image_read(exemplar_name, &image));
     RfMapView map = {"colour", RF_MAP_COLOUR, rf_image_view(image), 1};
-    require(rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar));
-    require(rf_image_create(s->size, s->size, map.image.channels, &frame));
+    bench_require(rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar));
+    bench_require(rf_image_create(s->size, s->size, map.image.channels, &frame));
     RfImageView view = rf_image_view(frame);
     snprintf(path, sizeof path, "builtin:%s?size=%dx%d", flow_name, s->size, s->size);
     for (int threads = 1; threads <= THREADS; ++threads)
@@ -112,7 +91,7 @@ static void measure(const Settings *s, const char *flow_name, const char *exempl
         RfFlowReadOptions reading = rf_flow_read_defaults();
         RfFlow *flow;
         rf_set_threads(threads);
-        require(rf_flow_open(path, &reading, &flow));
+        bench_require(rf_flow_open(path, &reading, &flow));
         run(s, flow, exemplar, &view, &times);
         print(flow_name, exemplar_name, threads, &times);
         rf_flow_close(flow);
@@ -127,16 +106,14 @@ static void parse(int argc, char **argv, Settings *s)
     *s = (Settings){.frames = 60, .size = 512, .only = ""};
     for (int i = 1; i < argc; ++i)
     {
-        char *equals = strchr(argv[i], '=');
-        const char *value = equals ? equals + 1 : "";
-        size_t name = equals ? (size_t)(equals - argv[i]) : 0;
-        if (name == 6 && strncmp(argv[i], "frames", name) == 0)
+        const char *value;
+        if ((value = bench_value(argv[i], "frames")))
             s->frames = atoi(value);
-        else if (name == 4 && strncmp(argv[i], "size", name) == 0)
+        else if ((value = bench_value(argv[i], "size")))
             s->size = atoi(value);
-        else if (name == 8 && strncmp(argv[i], "exemplar", name) == 0)
+        else if ((value = bench_value(argv[i], "exemplar")))
             s->exemplar = value;
-        else if (name == 4 && strncmp(argv[i], "only", name) == 0)
+        else if ((value = bench_value(argv[i], "only")))
             s->only = value;
         else
         {

@@ -15,6 +15,7 @@
 // (blocks), noisy (blocks and 4 % noise), blurred, or blended (overlapping blocks, averaged).
 
 #include "kernels/neighbours.h"
+#include "bench.h"
 #include "core/random.h"
 #include "core/simd.h"
 #include "kernels/short_bounds.h"
@@ -25,7 +26,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #ifdef __x86_64__
 #include <immintrin.h>
 #endif
@@ -37,33 +37,6 @@ enum
     MAX_RUNS = 100,
     BLOCK = 14
 };
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
-
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
-static double median(double *values, int n)
-{
-    qsort(values, (size_t)n, sizeof *values, compare);
-    return values[n / 2];
-}
-
-static void require(RfResult result)
-{
-    if (result == RF_OK)
-        return;
-    fprintf(stderr, "bench_neighbours: %s\n", rf_last_error()->message);
-    exit(1);
-}
 
 // ---- floors ------------------------------------------------------------------------------------------------------
 
@@ -135,12 +108,12 @@ static double comparison_floor(const float *queries, const float *candidates, in
     if (rf_simd_level() == RF_SIMD_PLAIN)
         return NAN;
     bool wide = rf_simd_level() == RF_SIMD_AVX512;
-    double start = now();
+    double start = bench_now();
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (int panel = 0; panel < QUERIES / 12 + 1; ++panel)
         (wide ? panel_floor_avx512 : panel_floor_avx2)(queries + (size_t)panel * 12 * (size_t)numbers, candidates,
                                                        tiles, numbers, least[panel]);
-    return now() - start;
+    return bench_now() - start;
 #else
     return NAN;
 #endif
@@ -153,7 +126,7 @@ static double short_floor(const float *queries, const float *candidates, int til
     static _Alignas(64) int32_t starts[RF_TILE_CANDIDATES];
     if (!rf_simd_multiplies_shorts())
         return NAN;
-    double start = now();
+    double start = bench_now();
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1)
     for (int panel = 0; panel < QUERIES / RF_TILE_QUERIES + 1; ++panel)
     {
@@ -165,7 +138,7 @@ static double short_floor(const float *queries, const float *candidates, int til
                               (const int16_t *)(const void *)(candidates + (size_t)t * RF_TILE_CANDIDATES * 16), 16,
                               starts, scores, RF_TILE_CANDIDATES);
     }
-    return now() - start;
+    return bench_now() - start;
 }
 
 // ---- queries -----------------------------------------------------------------------------------------------------
@@ -190,7 +163,7 @@ static RfImageView view_of(const Picture *p)
 static Picture read_picture(const char *name, int size, int channels)
 {
     RfImage *image;
-    require(rf_image_read(name, &image));
+    bench_require(rf_image_read(name, &image));
     RfImageView from = rf_image_view(image);
     Picture p = make_picture(size, size, channels);
     int left = from.width > size ? (from.width - size) / 2 : 0, top = from.height > size ? (from.height - size) / 2 : 0;
@@ -262,7 +235,7 @@ static float *make_queries(const char *kind, const Picture *exemplar, int side)
         corners[i][1] = i / QUERY_SIDE;
     }
     RfWindowSource source = {.image = view_of(&picture)};
-    require(rf_windows_gather(&source, side, false, (const int(*)[2])corners, QUERIES, windows, NULL));
+    bench_require(rf_windows_gather(&source, side, false, (const int(*)[2])corners, QUERIES, windows, NULL));
     free(picture.pixels);
     return windows;
 }
@@ -304,12 +277,12 @@ static void run(const Case *test, const char *kind, const Picture *exemplar, int
     int runs = test->side > 9 ? 3 : g_runs; // these take seconds
     for (int r = 0; r < runs; ++r)
     {
-        double start = now();
-        require(rf_windows_create(&source, 1, &options, &database));
-        create[r] = now() - start;
-        start = now();
-        require(rf_windows_search(database, &queries, matches));
-        search[r] = now() - start;
+        double start = bench_now();
+        bench_require(rf_windows_create(&source, 1, &options, &database));
+        create[r] = bench_now() - start;
+        start = bench_now();
+        bench_require(rf_windows_search(database, &queries, matches));
+        search[r] = bench_now() - start;
         few[r] = comparison_floor(query_numbers, candidate_numbers, (int)tiles, 32, threads);
         shorts[r] = short_floor(query_numbers, candidate_numbers, (int)tiles, threads);
         all[r] = r < 3 ? comparison_floor(query_numbers, candidate_numbers, (int)tiles, numbers, threads) : all[r % 3];
@@ -317,14 +290,14 @@ static void run(const Case *test, const char *kind, const Picture *exemplar, int
         candidates = rf_windows_count(database);
         rf_windows_destroy(database);
     }
-    double search_ms = median(search, runs), few_ms = median(few, runs), all_ms = median(all, runs),
-           shorts_ms = median(shorts, runs), flops = 2.0 * 32 * (double)tiles * 32 * QUERIES;
+    double search_ms = bench_median(search, runs), few_ms = bench_median(few, runs), all_ms = bench_median(all, runs),
+           shorts_ms = bench_median(shorts, runs), flops = 2.0 * 32 * (double)tiles * 32 * QUERIES;
     const char *name = strrchr(test->picture, '/') ? strrchr(test->picture, '/') + 1 : test->picture;
     printf("%s %s (%dx%dx%d; %d components: %.1f %%),%dx%d,%d,search,%.2f,%d,%.2f,%.2f,%.2f,%.0f\n", name, kind,
            test->side, test->side, test->channels, components, (double)kept * 100, QUERIES, candidates, threads,
            search_ms, runs, few_ms, all_ms, shorts_ms, flops / search_ms * 1e-6);
     printf("%s %s (%dx%dx%d; %d components: %.1f %%),%d,%d,create,%.2f,%d,,,,\n", name, kind, test->side, test->side,
-           test->channels, components, (double)kept * 100, candidates, threads, median(create, runs), runs);
+           test->channels, components, (double)kept * 100, candidates, threads, bench_median(create, runs), runs);
     printf("# %s %s: %.0f %% of the speed of the floor of 32 (%.0f GFLOP/s), %.1f times that of all\n", name, kind,
            100 * few_ms / search_ms, flops / few_ms * 1e-6, all_ms / search_ms);
     fflush(stdout);

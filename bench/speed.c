@@ -6,6 +6,7 @@
 // The floors are measured in the same run, after every fifth frame: copying a frame, and one bilinear RGBA sample a
 // drawn sample, no weights, no edges. The machine may be shared, so compare figures of one run only.
 
+#include "bench.h"
 #include "riffle/riffle.h"
 #include "support/scenes.h"
 
@@ -14,7 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum
 {
@@ -25,39 +25,20 @@ enum
 
 typedef float Vec4 __attribute__((vector_size(16)));
 
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
-
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
-static double median(double *values, int n)
-{
-    qsort(values, (size_t)n, sizeof *values, compare);
-    return values[n / 2];
-}
-
 static double copy_floor(float *to, const float *from, size_t floats, int threads)
 {
-    double start = now();
+    double start = bench_now();
 #pragma omp parallel for num_threads(threads)
     for (int part = 0; part < threads; ++part)
         memcpy(to + floats * (size_t)part / (size_t)threads, from + floats * (size_t)part / (size_t)threads,
                floats / (size_t)threads * sizeof *to);
-    return now() - start;
+    return bench_now() - start;
 }
 
 // Rows of a frame, each sampled along a slightly turned line of the texture, `layers` times over.
 static double sampling_floor(const Vec4 *texture, Vec4 *frame, float layers, int threads)
 {
-    double start = now();
+    double start = bench_now();
     int rows = (int)((float)SIZE * layers);
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
     for (int row = 0; row < rows; ++row)
@@ -75,15 +56,7 @@ static double sampling_floor(const Vec4 *texture, Vec4 *frame, float layers, int
             frame[(size_t)y * SIZE + (size_t)x] += upper + fy * (lower - upper);
         }
     }
-    return now() - start;
-}
-
-static void require(RfResult result)
-{
-    if (result == RF_OK)
-        return;
-    fprintf(stderr, "bench_speed: %s\n", rf_last_error()->message);
-    exit(1);
+    return bench_now() - start;
 }
 
 // The two-vortex scene in slow motion: 3 pixels a frame at most where it is drawn four times as large as it is given.
@@ -110,8 +83,8 @@ static double run(const RfExemplar *exemplar, const Case *test, int threads, int
     static const char *const names[4] = {"advect", "distribute", "draw", "all"};
     RfLagrangian *lagrangian;
     RfImage *image;
-    require(rf_lagrangian_create(exemplar, &options, &lagrangian));
-    require(rf_image_create(SIZE, SIZE, 3, &image));
+    bench_require(rf_lagrangian_create(exemplar, &options, &lagrangian));
+    bench_require(rf_image_create(SIZE, SIZE, 3, &image));
     RfImageView frame = rf_image_view(image);
     float *copy = malloc((size_t)SIZE * SIZE * 3 * sizeof *copy);
     Vec4 *texture = aligned_alloc(64, (TEXTURE + 2) * (TEXTURE + 1) * sizeof *texture + 64),
@@ -126,7 +99,7 @@ static double run(const RfExemplar *exemplar, const Case *test, int threads, int
     for (int f = 0; f < frames + warm_up; ++f)
     {
         RfFlowView view = scene_step(&scene, f);
-        require(rf_lagrangian_step(lagrangian, &view, &frame));
+        bench_require(rf_lagrangian_step(lagrangian, &view, &frame));
         if (f < warm_up)
             continue;
         RfLagrangianStats s = rf_lagrangian_stats(lagrangian);
@@ -142,10 +115,10 @@ static double run(const RfExemplar *exemplar, const Case *test, int threads, int
         copies[k / 5] = copy_floor(copy, frame.pixels, (size_t)SIZE * SIZE * 3, threads);
         samplings[k / 5] = sampling_floor(texture, sums, layers, threads);
     }
-    double copy_ms = median(copies, (frames + 4) / 5), sampling_ms = median(samplings, (frames + 4) / 5);
+    double copy_ms = bench_median(copies, (frames + 4) / 5), sampling_ms = bench_median(samplings, (frames + 4) / 5);
     for (int s = 0; s < 4; ++s)
         printf("%s (%d grids; %.1f layers),%dx%d,%d,%s,%.2f,%d,%.2f,%.2f\n", name, live, (double)layers, SIZE, SIZE,
-               threads, names[s], median(stage[s], frames), frames, copy_ms, sampling_ms);
+               threads, names[s], bench_median(stage[s], frames), frames, copy_ms, sampling_ms);
     fflush(stdout);
     scene_moments_free(&scene);
     rf_lagrangian_destroy(lagrangian);
@@ -153,7 +126,7 @@ static double run(const RfExemplar *exemplar, const Case *test, int threads, int
     free(copy);
     free(texture);
     free(sums);
-    return median(stage[3], frames);
+    return bench_median(stage[3], frames);
 }
 
 int main(int argc, char **argv)
@@ -164,10 +137,10 @@ int main(int argc, char **argv)
             return fprintf(stderr, "bench_speed: %s: must be frames=N or case=N\n", argv[i]), 2;
     frames = frames < 1 ? 1 : frames > MAX_FRAMES ? MAX_FRAMES : frames;
     RfImage *image;
-    require(rf_image_read("builtin:bubbles?size=256", &image));
+    bench_require(rf_image_read("builtin:bubbles?size=256", &image));
     RfMapView map = {"colour", RF_MAP_COLOUR, rf_image_view(image), 1};
     RfExemplar *exemplar;
-    require(rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar));
+    bench_require(rf_exemplar_create(&map, 1, RF_TILING_AUTO, &exemplar));
     printf("case,size,threads,stage,ms,frames,copy floor ms,sampling floor ms\n");
     RfLagrangianOptions options = rf_lagrangian_defaults(), paper = rf_lagrangian_paper();
     options.particle_radius = paper.particle_radius = 80; // about 150 particles in steady state

@@ -14,13 +14,13 @@
 //
 // speed: exemplars drawn by the program, 1 and 2 threads. CSV: exemplar,from,to,threads,ms (median of runs),runs,
 // ns a pixel. The machine may be shared, so compare figures of one run only.
+#include "bench.h"
 #include "support/peers.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum
 {
@@ -33,27 +33,6 @@ typedef struct Settings
     const char *only, *out;
     int runs, seeds, threads;
 } Settings;
-
-static void require(RfResult result)
-{
-    if (result == RF_OK)
-        return;
-    fprintf(stderr, "bench_synth: %s: %s\n", rf_last_error()->file, rf_last_error()->message);
-    exit(1);
-}
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
-
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 // ---- arguments
 
@@ -165,13 +144,13 @@ static void print_row(const PeerRow *row, double verbatim)
 static void print_others(const PeerTable *table, const char *name)
 {
     RfImage *exemplar, *picture;
-    require(peers_image(table, name, "exemplar", &exemplar));
+    bench_require(peers_image(table, name, "exemplar", &exemplar));
     RfImageView from = rf_image_view(exemplar);
     for (int i = 0; i < table->count; ++i)
     {
         if (strcmp(table->rows[i].name, name) != 0)
             continue;
-        require(peers_image(table, name, table->rows[i].tool, &picture));
+        bench_require(peers_image(table, name, table->rows[i].tool, &picture));
         RfImageView to = rf_image_view(picture);
         print_row(&table->rows[i], peers_verbatim(&from, &to));
         rf_image_destroy(picture);
@@ -225,14 +204,14 @@ static void run_own(const Settings *s, const RfOptimizeOptions *options, const c
 {
     PeerOwn own;
     char path[1200];
-    require(peers_synthesise(table, name, options, s->runs, &own));
+    bench_require(peers_synthesise(table, name, options, s->runs, &own));
     peers_add(table, &own.row);
     print_row(&own.row, own.verbatim);
     if (s->out)
     {
         snprintf(path, sizeof path, "%s/%s.png", s->out, name);
         rf_image_set_origin(own.picture, RF_SAMPLE_U8, RF_ENCODING_SRGB);
-        require(rf_image_write(path, own.picture));
+        bench_require(rf_image_write(path, own.picture));
     }
     rf_image_destroy(own.picture);
 }
@@ -281,20 +260,19 @@ static double time_case(const Case *c, const Settings *s, int threads)
     RfImage *image, *out;
     RfExemplar *exemplar;
     snprintf(name, sizeof name, "%s?size=%d", c->exemplar, c->from);
-    require(rf_image_read(name, &image));
+    bench_require(rf_image_read(name, &image));
     RfMapView map = {"colour", RF_MAP_COLOUR, rf_image_view(image), 1};
-    require(rf_exemplar_create(&map, 1, RF_TILING_NO, &exemplar));
-    require(rf_image_create(c->to, c->to, map.image.channels, &out));
+    bench_require(rf_exemplar_create(&map, 1, RF_TILING_NO, &exemplar));
+    bench_require(rf_image_create(c->to, c->to, map.image.channels, &out));
     RfImageView view = rf_image_view(out);
     rf_set_threads(threads);
     for (int r = 0; r < s->runs; ++r)
     {
-        double start = now();
-        require(rf_optimize_still(exemplar, &s->options, NULL, &view));
-        times[r] = now() - start;
+        double start = bench_now();
+        bench_require(rf_optimize_still(exemplar, &s->options, NULL, &view));
+        times[r] = bench_now() - start;
     }
-    qsort(times, (size_t)s->runs, sizeof *times, by_size);
-    double ms = times[s->runs / 2];
+    double ms = bench_median(times, s->runs);
     printf("%s,%d,%d,%d,%.1f,%d,%.0f\n", c->exemplar, c->from, c->to, threads, ms, s->runs,
            1e6 * ms / ((double)c->to * c->to));
     fflush(stdout);

@@ -68,7 +68,15 @@ static inline int rf_mirror_int(int x, int n)
 /// Index brought into 0 .. n - 1: round the border of what tiles, else to the nearest end.
 static inline int rf_border_int(int x, int n, bool tiles)
 {
+    if (x >= 0 && x < n)
+        return x;
     return tiles ? rf_wrap_int(x, n) : rf_clamp_int(x, 0, n - 1);
+}
+
+/// The nearest whole number; of what is absurdly far, or NaN, one that is a million off: casts stay defined.
+static inline int rf_nearest_int(float x)
+{
+    return (int)floorf(rf_clamp(x, -1e6f, 1e6f) + 0.5f);
 }
 
 static inline RfVec2 rf_vec2_add(RfVec2 a, RfVec2 b)

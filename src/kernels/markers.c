@@ -324,8 +324,7 @@ void rf_markers_fill(RfMarkers *m)
 
 RfVec2 rf_markers_source(const RfMarkers *m, RfVec2 at)
 {
-    // Points far outside are given what the border says: casts stay defined.
-    int x = (int)floorf(rf_clamp(at.x, -1e6f, 1e6f) + 0.5f), y = (int)floorf(rf_clamp(at.y, -1e6f, 1e6f) + 0.5f);
+    int x = rf_nearest_int(at.x), y = rf_nearest_int(at.y);
     int px = rf_border_int(x, m->width, m->tiles), py = rf_border_int(y, m->height, m->tiles);
     const RfMarker *k = &m->pixels[(ptrdiff_t)py * m->width + px];
     RfVec2 step = {at.x - k->at.x, at.y - k->at.y};

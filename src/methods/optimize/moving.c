@@ -142,6 +142,9 @@ static RfResult open_exemplar(RfOptimize *o)
     if (!o->variations || !o->penalties || !o->prices)
         return RF_OUT_OF_MEMORY;
     rf_windows_vary(o->windows, e->channels, o->variations);
+    o->variation = 0;
+    for (size_t i = 0; i < count; ++i)
+        o->variation += (double)o->variations[i] / (double)count;
     return RF_OK;
 }
 

@@ -70,6 +70,8 @@ struct RfOptimize
     RfWindowDatabase *windows;
     /// [windows]: how much each varies, and what is added to its cost.
     float *variations, *penalties;
+    /// The mean of all.
+    double variation;
     float *prices;
 
     int max_patches;
@@ -80,8 +82,9 @@ struct RfOptimize
     RfWindowMatch *matches;
     RfPatchScratch *scratch;
 
-    /// Of the last step that laid any: patches, and the mean of their distances on the coarse level.
+    /// Patches that the last step laid.
     int laid;
+    /// The mean of the distances of those that were laid last, on the coarse level.
     double distance;
     double seconds[3];
 };

@@ -38,17 +38,10 @@ static const float URGENT = 3;
 // over rf_usage's step. With much less bright pebbles crowd out the others, with more patches fit badly.
 static const float PRICE = 2;
 
-static int index_in(float at, int n, bool tiles)
-{
-    int i = (int)floorf(rf_clamp(at, -1e6f, 1e6f) + 0.5f);
-    if (i >= 0 && i < n)
-        return i;
-    return rf_border_int(i, n, tiles);
-}
-
 static const float *pixel_at(const RfSynthesisExemplar *e, RfVec2 s)
 {
-    int x = index_in(s.x, e->width, e->tiles), y = index_in(s.y, e->height, e->tiles);
+    int x = rf_border_int(rf_nearest_int(s.x), e->width, e->tiles);
+    int y = rf_border_int(rf_nearest_int(s.y), e->height, e->tiles);
     return e->pixels + ((ptrdiff_t)y * e->width + x) * e->channels;
 }
 
@@ -277,21 +270,19 @@ static float seen_variation(const RfOptimize *o)
 {
     const RfSynthesisExemplar *e = &o->material.levels[o->level];
     const RfMarkers *m = &o->markers;
-    int half = o->side / 2, count = rf_windows_count(o->windows), samples = 0;
-    double seen = 0, all = 0;
-    for (int i = 0; i < count; ++i)
-        all += (double)o->variations[i] / count;
+    int half = o->side / 2, samples = 0;
+    double seen = 0;
     for (int y = SAMPLED / 2; y < m->height; y += SAMPLED)
         for (int x = SAMPLED / 2; x < m->width; x += SAMPLED, ++samples)
         {
             RfVec2 s = to_level(o, m->pixels[(ptrdiff_t)y * m->width + x].source);
-            int u = index_in(s.x, e->width, e->tiles) - half, v = index_in(s.y, e->height, e->tiles) - half;
+            int u = rf_nearest_int(s.x) - half, v = rf_nearest_int(s.y) - half;
             u = e->tiles ? rf_wrap_int(u, e->width) : rf_clamp_int(u, 0, e->width - o->side);
             v = e->tiles ? rf_wrap_int(v, e->height) : rf_clamp_int(v, 0, e->height - o->side);
             int window = rf_windows_at(o->windows, (RfWindowPlace){0, u, v});
             seen += window >= 0 ? (double)o->variations[window] : 0;
         }
-    return all > 0 ? (float)(seen / rf_max_int(samples, 1) / all) : 1;
+    return o->variation > 0 ? (float)(seen / rf_max_int(samples, 1) / o->variation) : 1;
 }
 
 // Part of its variation that a window's cost is lowered by: more where the texture has become smoother than the
