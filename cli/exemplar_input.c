@@ -94,7 +94,9 @@ static void warn_of_data(const Settings *settings, const MapArgument *argument, 
     static const char turned[] = "motion|velocity";
     static const char plain[] = "height|displacement|bump|roughness|gloss|specular|metallic|occlusion|emission|"
                                 "temperature|density";
-    bool guide = strcmp(argument->name, "guide") == 0;
+    // optimize refuses a guide, and says so itself.
+    bool knows = settings->verb->bit == VERB_SYNTH || strcmp(settings->method->name, "optimize") == 0;
+    bool guide = knows && strcmp(argument->name, "guide") == 0;
     if (guide || kind != RF_MAP_DATA || text_choice(plain, argument->name) >= 0)
         return;
     char list[256];

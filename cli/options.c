@@ -25,14 +25,29 @@ static int keep_method_option(Settings *settings, const RfOption *option, const 
     return CODE_DONE;
 }
 
-/// elsewhere: other verbs that have it.
-static int unknown_option(const Verb *verb, const char *word, unsigned elsewhere)
+static const RfOption *verb_option(const Verb *verb, const char *name)
+{
+    int count = 0;
+    const RfOption *table = verb->table ? verb->table(&count) : NULL;
+    for (int i = 0; i < count; ++i)
+        if (strcmp(table[i].name, name) == 0)
+            return &table[i];
+    return NULL;
+}
+
+/// Says which other verbs have it. name: NULL for a letter.
+static int unknown_option(const Verb *verb, const char *word, const char *name)
 {
     char names[128] = "";
     int count = 0;
     const Verb *verbs = verb_table(&count);
+    const GenericOption *generic = generic_option(name, word[1]);
+    const RfOption *option = NULL;
+    unsigned elsewhere = generic ? generic->verbs : 0;
+    if (name && method_with_option(name, &option))
+        elsewhere |= VERB_TEXTURE;
     for (int i = 0; i < count; ++i)
-        if (verbs[i].bit & elsewhere)
+        if ((verbs[i].bit & elsewhere) || (name && verb_option(&verbs[i], name)))
             snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", names[0] ? ", " : "", verbs[i].name);
     return fail(CODE_USAGE, NULL, NULL, "%s has no option %s%s%s%s; riffle %s --help lists them", verb->name, word,
                 names[0] ? " (" : "", names, names[0] ? " has)" : "", verb->name);
@@ -55,23 +70,12 @@ static int refuse_value(const char *name, const char *equals)
     return equals ? fail(CODE_USAGE, NULL, NULL, "--%s takes no value", name) : CODE_DONE;
 }
 
-static const RfOption *verb_option(const Verb *verb, const char *name)
-{
-    int count = 0;
-    const RfOption *table = verb->table(&count);
-    for (int i = 0; i < count; ++i)
-        if (strcmp(table[i].name, name) == 0)
-            return &table[i];
-    return NULL;
-}
-
-static int parse_method_option(Parser *parser, const char *word, const char *name, const char *equals,
-                               unsigned elsewhere)
+static int parse_method_option(Parser *parser, const char *word, const char *name, const char *equals)
 {
     const Verb *verb = parser->settings->verb;
-    const RfOption *option = verb->table ? verb_option(verb, name) : NULL;
+    const RfOption *option = verb_option(verb, name);
     if (!option && (verb->bit != VERB_TEXTURE || !method_with_option(name, &option)))
-        return unknown_option(verb, word, method_with_option(name, &option) ? VERB_TEXTURE : elsewhere);
+        return unknown_option(verb, word, name);
     const char *value = equals ? equals + 1 : "yes";
     if (option->kind != RF_OPTION_BOOL)
     {
@@ -90,11 +94,8 @@ static int parse_option(Parser *parser, const char *word, const GenericOption *o
                         const char *equals)
 {
     if (!option || !(option->verbs & parser->settings->verb->bit))
-    {
-        unsigned elsewhere = option ? option->verbs : 0;
-        return name ? parse_method_option(parser, word, name, equals, elsewhere)
-                    : unknown_option(parser->settings->verb, word, elsewhere);
-    }
+        return name ? parse_method_option(parser, word, name, equals)
+                    : unknown_option(parser->settings->verb, word, NULL);
     const char *value = NULL;
     int code = option->value ? take_value(parser, word, equals, option->value, &value) : refuse_value(name, equals);
     return code ? code : option->set(parser->settings, value);
@@ -106,7 +107,7 @@ static int parse_long(Parser *parser, const char *word)
     const char *equals = strchr(word, '=');
     size_t length = equals ? (size_t)(equals - word) - 2 : strlen(word) - 2;
     if (length >= sizeof name)
-        return unknown_option(parser->settings->verb, word, 0);
+        return unknown_option(parser->settings->verb, word, word + 2);
     memcpy(name, word + 2, length);
     name[length] = '\0';
     return parse_option(parser, word, generic_option(name, 0), name, equals);

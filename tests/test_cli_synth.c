@@ -577,11 +577,11 @@ static void coarse_levels_help_where_turns_cancel_each_other(void **state)
     (void)state;
     TestFolder folder = test_folder_make();
     // The mean of stripes that point against each other has no direction on coarse levels, which must not make the
-    // exemplar appear larger there: with such levels it is 3.6 times one turn's energy, not 3.1.
+    // exemplar appear larger there: with such levels it is 0.17.
     paint(&folder, "one.png", 256, 256, 1, RF_SAMPLE_U16, paint_quarter_turn);
     paint(&folder, "stripes.png", 256, 256, 1, RF_SAMPLE_U16, paint_stripes);
     double one = energy_with(&folder, "one.png"), stripes = energy_with(&folder, "stripes.png");
-    if (!(stripes < 3.3 * one))
+    if (!(one < 0.06 && stripes < 0.16))
         fail_msg("energy %g, with stripes %g", one, stripes);
     test_folder_remove(&folder);
 }

@@ -164,6 +164,31 @@ static void what_flows_in_continues_what_is_there(void **state)
     }
 }
 
+// Gaps that open wherever a flow turns are between markers: nothing flows in there.
+static void a_turning_disc_is_not_continued(void **state)
+{
+    (void)state;
+    static float velocity[2 * W * H];
+    RfMarkers m = identity(W, H, false);
+    for (int f = 1; f <= 60; ++f)
+    {
+        RfFlowView flow = linear_flow(velocity, 0, -0.05f, 0.05f, 0, f);
+        rf_markers_carry(&m, &flow, f - 1);
+        rf_markers_fill(&m);
+    }
+    double sum = 0, count = 0;
+    for (int y = 0; y < H; ++y)
+        for (int x = 0; x < W; ++x)
+        {
+            float dx = (float)x - 0.5f * (W - 1), dy = (float)y - 0.5f * (H - 1);
+            bool inside = dx * dx + dy * dy < 0.16f * H * H;
+            sum += inside ? (double)m.pixels[y * W + x].continued : 0;
+            count += inside;
+        }
+    assert_true(sum < 0.2 * count);
+    rf_markers_free(&m);
+}
+
 static void no_marker_no_voice(void **state)
 {
     (void)state;
@@ -247,6 +272,7 @@ int main(void)
         cmocka_unit_test(a_bend_that_mirrors_has_a_negative_stretch),
         cmocka_unit_test(borders_move_by_parts_of_a_pixel),
         cmocka_unit_test(what_flows_in_continues_what_is_there),
+        cmocka_unit_test(a_turning_disc_is_not_continued),
         cmocka_unit_test(no_marker_no_voice),
         cmocka_unit_test(the_cut_is_closed_and_the_least),
     };

@@ -335,6 +335,48 @@ static void a_turned_piece_is_found_by_windows_that_are_turned_alike(void **stat
     rf_synthesis_exemplar_free(&e);
 }
 
+// Turned by what is no quarter, and at another scale, a piece is still seen as it is, between pixels too.
+static void a_piece_at_any_angle_costs_nothing(void **state)
+{
+    (void)state;
+    enum
+    {
+        N = 40,
+        EXEMPLAR = 120
+    };
+    RfSynthesisExemplar e = make_exemplar(EXEMPLAR, EXEMPLAR, CHANNELS, false, 5);
+    static RfVec2 turns[4 * N * N];
+    for (int k = 1; k < 8; ++k)
+    {
+        float angle = 0.4f * (float)k, scale = k % 2 ? 1 : 0.6f;
+        RfVec2 turn = {scale * cosf(angle), scale * sinf(angle)}, middle = {0.5f * N, 0.5f * N};
+        RfSynthesisFrame f = make_piece(&e, N, N, false, 0, 0, 2), fine;
+        for (int i = 0; i < N * N; ++i)
+        {
+            RfVec2 step = rf_vec2_sub((RfVec2){(float)(i % N), (float)(i / N)}, middle);
+            f.sources[i] = rf_vec2_add((RfVec2){60.3f, 59.8f}, rf_turn(turn, step));
+        }
+        for (int i = 0; i < 4 * N * N; ++i)
+            turns[i] = turn;
+        rf_synthesis_show(&f, &e, 0);
+        rf_synthesis_place(&f, turns);
+        assert_true(search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .all = true}) == 0);
+        // And its doubled places are one piece.
+        assert_int_equal(rf_synthesis_frame_create(2 * N, 2 * N, CHANNELS, false, &fine), RF_OK);
+        rf_synthesis_refine(&f, turns, &fine);
+        for (int i = 0; i < 4 * N * N; ++i)
+        {
+            RfVec2 step =
+                rf_vec2_sub((RfVec2){(float)(i % (2 * N)), (float)(i / (2 * N))}, (RfVec2){N + 0.5f, N + 0.5f});
+            RfVec2 place = rf_vec2_add((RfVec2){2 * 60.3f + 0.5f, 2 * 59.8f + 0.5f}, rf_turn(turn, step));
+            assert_true(rf_vec2_length(rf_vec2_sub(place, fine.sources[i])) < 1e-3f);
+        }
+        rf_synthesis_frame_free(&f);
+        rf_synthesis_frame_free(&fine);
+    }
+    rf_synthesis_exemplar_free(&e);
+}
+
 // What has not been touched is not searched, and what has not changed is not made anew.
 static void only_what_is_stirred_is_searched_and_only_what_has_changed_is_made(void **state)
 {
@@ -424,6 +466,7 @@ int main(void)
         cmocka_unit_test(a_piece_of_the_exemplar_is_a_fixed_point),
         cmocka_unit_test(a_window_that_has_lost_its_place_is_told_it_by_its_pixels),
         cmocka_unit_test(a_turned_piece_is_found_by_windows_that_are_turned_alike),
+        cmocka_unit_test(a_piece_at_any_angle_costs_nothing),
         cmocka_unit_test(only_what_is_stirred_is_searched_and_only_what_has_changed_is_made),
         cmocka_unit_test(doubled_places_of_a_piece_are_a_piece),
         cmocka_unit_test(scattered_windows_lie_inside_everywhere_and_by_their_seed),

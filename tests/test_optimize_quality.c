@@ -23,7 +23,7 @@ enum
 
 // Of the flow error over its floor; of the flicker over its own; of the windows' distance to the exemplar's over that
 // of warp; of the contrast from the exemplar's. The frame is small and the flow in it fast: at 512 x 512 all are lower.
-static const double FLOW_LIMIT = 1.6, FLICKER_LIMIT = 0.22, PATCH_LIMIT = 0.95, CONTRAST_LIMIT = 0.1;
+static const double FLOW_LIMIT = 1.7, FLICKER_LIMIT = 0.22, PATCH_LIMIT = 0.95, CONTRAST_LIMIT = 0.1;
 
 typedef struct Judged
 {

@@ -56,8 +56,9 @@ typedef struct RfOptimizeOptions
     int iterations;
     /// Of stills; moving textures show the exemplar's pixels. Default RF_FORM_DISCRETE.
     RfOptimizeForm form;
-    /// Price of using one place of the exemplar more than others, against the mean cost of a window, 0 to 100. Default
-    /// 2. 0 lets the result collapse to the places that fit themselves best.
+    /// Price of using one place of the exemplar more than others, against the mean cost of a window, 0 to 10.
+    /// Default 2. 0 lets the result collapse to the places that fit themselves best; above 4 what fits badly is taken
+    /// for being new.
     float spread;
     /// Of moving textures; stills have RfOptimizeConstraints.orientation. Default RF_ORIENT_FREE.
     RfOptimizeOrient orient;

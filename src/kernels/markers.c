@@ -275,15 +275,19 @@ static float shortest(float step, int n)
     return step - floorf(step / (float)n + 0.5f) * (float)n;
 }
 
-// Whether a pixel lies between its nearest marker and another as far on the other side. Into a frame that tiles nothing
-// flows.
+// Whether a pixel without a marker is a gap between markers: one lies near it on the side away from the nearest. Gaps
+// come one by one and in pairs wherever a flow turns. Into a frame that tiles nothing flows.
 static bool is_between(const RfMarkers *m, int x, int y, int32_t nearest)
 {
-    if (m->tiles)
-        return true;
-    int i = 2 * x - nearest % m->width, j = 2 * y - nearest / m->width;
-    int32_t other = j * m->width + i;
-    return i >= 0 && j >= 0 && i < m->width && j < m->height && m->index[other] == other;
+    int dx = nearest % m->width - x, dy = nearest / m->width - y;
+    for (int j = rf_max_int(y - NEAR, 0); j <= rf_min_int(y + NEAR, m->height - 1) && !m->tiles; ++j)
+        for (int i = rf_max_int(x - NEAR, 0); i <= rf_min_int(x + NEAR, m->width - 1); ++i)
+        {
+            bool away = (i - x) * dx + (j - y) * dy < 0;
+            if (away && m->index[j * m->width + i] == j * m->width + i)
+                return true;
+        }
+    return m->tiles;
 }
 
 static void fill_row(void *context, int y, int worker)
@@ -333,22 +337,24 @@ RfVec2 rf_markers_source(const RfMarkers *m, RfVec2 at)
     return rf_vec2_add(k->source, rf_bend(k->bend, step));
 }
 
+// 0 outside the frame.
+static float share_at(const RfMarkers *m, int x, int y)
+{
+    if (!m->tiles && (x < 0 || y < 0 || x >= m->width || y >= m->height))
+        return 0;
+    return m->pixels[(ptrdiff_t)rf_wrap_int(y, m->height) * m->width + rf_wrap_int(x, m->width)].share;
+}
+
 float rf_markers_share(const RfMarkers *m, int x, int y)
 {
-    static const int steps[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
-    float own = m->pixels[(ptrdiff_t)y * m->width + x].share, sum = 0;
+    float own = m->pixels[(ptrdiff_t)y * m->width + x].share;
     if (own > 0)
         return own;
-    int count = 0;
-    for (int k = 0; k < 4; ++k)
-    {
-        int i = rf_border_int(x + steps[k][0], m->width, m->tiles),
-            j = rf_border_int(y + steps[k][1], m->height, m->tiles);
-        float share = m->pixels[(ptrdiff_t)j * m->width + i].share;
-        sum += share;
-        count += share > 0;
-    }
-    return count >= 2 ? sum / (float)count : 0;
+    float left = share_at(m, x - 1, y), right = share_at(m, x + 1, y);
+    if (left > 0 && right > 0)
+        return 0.5f * (left + right);
+    float above = share_at(m, x, y - 1), below = share_at(m, x, y + 1);
+    return above > 0 && below > 0 ? 0.5f * (above + below) : 0;
 }
 
 // Adds a place to the voice that says the same, or as a new one. `out` holds weights, and sums of places times weights

@@ -68,7 +68,8 @@ typedef struct RfVoices
 
 void rf_markers_hear(const RfMarkers *markers, int x, int y, RfVoices *out);
 
-/// The share of the pixel's marker; where it has none between two that have one, their mean.
+/// The share of the pixel's marker; where it has none, but its left and right or its upper and lower neighbour have
+/// one, their mean.
 float rf_markers_share(const RfMarkers *markers, int x, int y);
 
 /// Where a point of the frame comes from as the marker of its pixel says, which must be there.

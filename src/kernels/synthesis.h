@@ -135,6 +135,9 @@ typedef struct RfSynthesisSearch
     const float *prices;
     /// rf_windows_vary of `windows`: costs are lowered by 3/4 of them, see rf_synthesis_penalties. NULL: they are not.
     const float *variations;
+    /// As in RfSynthesisAssign.
+    int guides;
+    const float *hold;
     /// Whole pixels only, and nothing turned: the fast path.
     bool plain;
     /// Windows where nothing has changed too.

@@ -158,10 +158,11 @@ static void add_coherent(const Walk *walk, Candidates *c, const RfSynthesisWindo
         }
 }
 
-// What is seen at a point between pixels: the exemplar where the point comes from, as the nearest pixel tells it, and
-// what makes that pixel differ from the exemplar (a target, a mean). So a window that is one piece of the exemplar is
-// seen as it is, however it is turned; from the nearest pixels alone it would be jagged, and smooth places would fit
-// it better than its own.
+// What is seen at a point between pixels: what the nearest pixel shows, and by how much the exemplar differs from there
+// to where the point comes from; of a pixel that is held to something else, as much of that as it shows of the
+// exemplar. So a window that is one piece of the exemplar is seen as it is, however it is turned. From the nearest
+// pixels alone it would be jagged, and smooth places would fit it better than its own. What is given, fixed pixels and
+// guides, is seen as it is.
 static void see(const Walk *walk, RfVec2 turn, RfVec2 point, int16_t *out)
 {
     const RfSynthesisFrame *f = walk->search->frame;
@@ -180,8 +181,16 @@ static void see(const Walk *walk, RfVec2 turn, RfVec2 point, int16_t *out)
     RfVec2 rest = rf_turn(turn, rf_vec2_sub(point, from));
     const int16_t *own = rf_synthesis_pixel(e, source);
     const int16_t *there = rf_synthesis_pixel(e, rf_vec2_add(source, rest));
-    for (int c = 0; c < f->picture.channels; ++c)
-        out[c] = (int16_t)rf_clamp_int(there[c] + pixel[c] - own[c], -RF_FIXED_RANGE / 2, RF_FIXED_RANGE / 2);
+    const float *hold = walk->search->hold;
+    float part = hold ? 1 / (1 + hold[(ptrdiff_t)py * f->width + px]) : 1;
+    int made = f->picture.channels - walk->search->guides;
+    for (int c = 0; c < made; ++c)
+    {
+        int value = pixel[c] + (int)lrintf(part * (float)(there[c] - own[c]));
+        out[c] = (int16_t)rf_clamp_int(value, -RF_FIXED_RANGE / 2, RF_FIXED_RANGE / 2);
+    }
+    for (int c = made; c < f->picture.channels; ++c)
+        out[c] = pixel[c];
 }
 
 // The window's pixels, turned back into the exemplar's frame.
@@ -295,12 +304,15 @@ static void set_penalties(const Walk *walk, float *penalties)
 // pixel, so that windows of one piece stay one to a part of a pixel. Else as far from its pixel as the window was.
 static RfVec2 place_of_match(const Walk *walk, const RfSynthesisWindow *window, RfVec2 at, RfWindowPlace match)
 {
-    Candidates *c = &walk->scratch->candidates;
-    RfVec2 own = rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at)));
     int x = match.x + walk->half, y = match.y + walk->half;
-    RfVec2 place = {(float)x + own.x - (float)whole(own.x), (float)y + own.y - (float)whole(own.y)};
     if (walk->search->plain)
-        return place;
+        return (RfVec2){(float)x, (float)y};
+    Candidates *c = &walk->scratch->candidates;
+    const RfSynthesisExemplar *e = walk->search->exemplar;
+    x = rf_border_int(x, e->width, e->tiles);
+    y = rf_border_int(y, e->height, e->tiles);
+    RfVec2 own = rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at)));
+    RfVec2 place = {(float)x + own.x - (float)whole(own.x), (float)y + own.y - (float)whole(own.y)};
     add(walk, c, own);
     add_coherent(walk, c, window, at);
     for (int i = 0; i < c->count; ++i)

@@ -15,7 +15,7 @@ static const RfOption g_options[] = {
      "Of stills and first frames: search and assign steps with each window on the coarsest level; half as many on each "
      "finer one."},
     {"form", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, form), "", 0, 1, RF_FORM_DISCRETE, "discrete|mean",
-     "Of stills and first frames: a pixel becomes one of the exemplar's (sharp), or the mean of what its windows say "
+     "Of stills: a pixel becomes one of the exemplar's (sharp), or the mean of what its windows say "
      "(smooth)."},
     {"spread", RF_OPTION_FLOAT, offsetof(RfOptimizeOptions, spread), "", 0, 10, 2, NULL,
      "Price of using one place of the exemplar more than others; 0 lets the result collapse to what fits itself best, "

@@ -326,6 +326,8 @@ static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *en
         .windows = s->windows,
         .variations = s->variations,
         .prices = round > 0 && s->options->spread > 0 ? s->prices : NULL,
+        .guides = s->material.guides,
+        .hold = s->bounds[s->level].hold,
         .plain = !is_turned(s),
         .all = all,
         .seed = s->options->seed,
