@@ -41,7 +41,7 @@ static int unknown_option(const Verb *verb, const char *word, const char *name)
     char names[128] = "";
     int count = 0;
     const Verb *verbs = verb_table(&count);
-    const GenericOption *generic = generic_option(name, word[1]);
+    const GenericOption *generic = name || !word[2] ? generic_option(name, word[1]) : NULL;
     const RfOption *option = NULL;
     unsigned elsewhere = generic ? generic->verbs : 0;
     if (name && method_with_option(name, &option))

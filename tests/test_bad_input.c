@@ -397,7 +397,7 @@ static void wrong_command_lines_are_refused_with_the_right_one(void **state)
         {GOOD "--fixed good.png", 2, "texture has no option --fixed (synth has)"},
         {GOOD "--method optimize --windows 8", 2, "riffle: windows: 8 is even"},
         {GOOD "-z", 2, "texture has no option -z"},
-        {GOOD "-qq", 2, "texture has no option -qq"},
+        {GOOD "-qq", 2, "texture has no option -qq;"},
         {"convert good.png outputs/a.png --fade 3", 2, "convert has no option --fade"},
         {GOOD "--seed", 2, "--seed needs a value: N"},
         {GOOD "--seed -1", 2, "--seed -1: must be a whole number"},

@@ -41,12 +41,12 @@ static float degrees_between(float a, float b)
 static void lines_have_their_direction(void **state)
 {
     (void)state;
-    for (int degrees = 0; degrees < 180; degrees += 7)
+    for (int degrees = 0; degrees < 180; degrees += 6)
     {
         float angle = (float)degrees * (RF_PI / 180);
         draw_lines(angle);
         RfDirectionality d = rf_directionality(g_grey, SIDE, SIDE, false, THRESHOLD);
-        if (!(degrees_between(d.angle, angle) < 1 && d.strength > 0.97f && d.angle >= 0 && d.angle < RF_PI))
+        if (!(degrees_between(d.angle, angle) < 0.5f && d.strength > 0.97f && d.angle >= 0 && d.angle < RF_PI))
             fail_msg("%d degrees: %g, strength %g", degrees, (double)(d.angle * (180 / RF_PI)), (double)d.strength);
     }
 }

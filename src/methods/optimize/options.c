@@ -16,7 +16,7 @@ static const RfOption g_options[] = {
      "finer one."},
     {"form", RF_OPTION_CHOICE, offsetof(RfOptimizeOptions, form), "", 0, 1, RF_FORM_DISCRETE, "discrete|mean",
      "Of stills: a pixel becomes one of the exemplar's (sharp), or the mean of what its windows say "
-     "(smooth)."},
+     "(smooth). Of moving textures: what the first frame is searched by; they show the exemplar's pixels."},
     {"spread", RF_OPTION_FLOAT, offsetof(RfOptimizeOptions, spread), "", 0, 10, 2, NULL,
      "Price of using one place of the exemplar more than others; 0 lets the result collapse to what fits itself best, "
      "above 4 what fits badly is taken for being new."},

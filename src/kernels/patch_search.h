@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// The best-fit patch under a mask: of all places of a picture that one at which it differs least from what is known.
+//
+// Wang, Wang, Yong, Sun. Synthesizing 2D directional moving texture. 2005 (equation 2, with weights for its mask).
+//
+// The result is that of trying all places one by one, of equals the first; it does not depend on the instruction set.
+// kernels/neighbours.h does the same for windows of one size that it knows beforehand; here each query has its own size
+// and mask, and a mask is mostly empty.
+#pragma once
+
+#include "riffle/data.h"
+
+enum
+{
+    /// Of a query's box.
+    RF_PATCH_BOX = 64,
+    RF_MAX_PATCH_TERMS = RF_PATCH_BOX * RF_PATCH_BOX * RF_MAX_EXEMPLAR_CHANNELS
+};
+
+/// A picture that patches are taken from.
+typedef struct RfPatchPicture
+{
+    int width, height, channels;
+    /// [channels][height][stride], and some numbers more at the end.
+    float *planes;
+    ptrdiff_t stride;
+    /// [height + 1][width + 1]: how many pixels above and left of here are not valid.
+    int32_t *invalid;
+} RfPatchPicture;
+
+/// pixels: [height][width][channels], finite where valid. valid: [height][width], 0: not valid; NULL: all are.
+RfResult rf_patch_picture_create(const float *pixels, int width, int height, int channels, const uint8_t *valid,
+                                 RfPatchPicture *out);
+void rf_patch_picture_free(RfPatchPicture *picture);
+
+typedef struct RfPatchQuery
+{
+    /// Of the box, 1 to RF_PATCH_BOX.
+    int width, height;
+    /// [height][width][channels] and [height][width]: what is known, and how much it counts, 0: not known.
+    const float *pixels, *weights;
+    /// A place that may fit well, from which the search starts. Any numbers: it changes the time, never the result.
+    int guess_x, guess_y;
+} RfPatchQuery;
+
+typedef struct RfPatchMatch
+{
+    /// Of the box's first (top left) pixel. -1 where no box of valid pixels has room.
+    int x, y;
+    /// Sum of squared differences, each times its weight.
+    double distance;
+} RfPatchMatch;
+
+/// What one search needs at a time.
+typedef struct RfPatchTerms
+{
+    int count;
+    ptrdiff_t offset[RF_MAX_PATCH_TERMS];
+    float value[RF_MAX_PATCH_TERMS], weight[RF_MAX_PATCH_TERMS];
+} RfPatchTerms;
+
+/// From inside: adds the differences from some numbers of the query to the sums of sixteen places side by side, the
+/// first of which lies at `first`; *least: the least sum.
+void rf_add_patch_terms(const float *first, const RfPatchTerms *terms, int from, int to, float *sums, float *least);
+
+RfPatchMatch rf_patch_search(const RfPatchPicture *picture, const RfPatchQuery *query, RfPatchTerms *scratch);
