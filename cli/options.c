@@ -47,7 +47,7 @@ static int unknown_option(const Verb *verb, const char *word, const char *name)
     if (name && method_with_option(name, &option))
         elsewhere |= VERB_TEXTURE;
     for (int i = 0; i < count; ++i)
-        if ((verbs[i].bit & elsewhere) || (name && verb_option(&verbs[i], name)))
+        if (verbs[i].bit != verb->bit && ((verbs[i].bit & elsewhere) || (name && verb_option(&verbs[i], name))))
             snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", names[0] ? ", " : "", verbs[i].name);
     return fail(CODE_USAGE, NULL, NULL, "%s has no option %s%s%s%s; riffle %s --help lists them", verb->name, word,
                 names[0] ? " (" : "", names, names[0] ? " has)" : "", verb->name);

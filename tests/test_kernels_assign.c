@@ -255,8 +255,7 @@ static void pixels_are_held_as_strongly_as_they_are_told(void **state)
             const RfSynthesisWindow *w = put_window(&s, 3, 3, 20, 11);
             RfSynthesisAssign assign = plain_assign(&s);
             assign.mean = mean;
-            assign.held = &held;
-            assign.hold = hold;
+            assign.held = (RfSynthesisHeld){&held, hold};
             assign_with(assign);
             for (int y = (int)w->at.y - HALF; y <= (int)w->at.y + HALF; ++y)
                 for (int x = (int)w->at.x - HALF; x <= (int)w->at.x + HALF; ++x)

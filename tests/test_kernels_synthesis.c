@@ -320,7 +320,7 @@ static void a_turned_piece_is_found_by_windows_that_are_turned_alike(void **stat
         f.sources[i] = (RfVec2){step.x + N - 1, step.y};
         turns[i] = turn;
     }
-    rf_synthesis_show(&f, &e, 0);
+    rf_synthesis_show(&f, &e, 0, (RfSynthesisHeld){0});
     assert_true(same_pixel(&f, 3, 5, shown_at(&e, N - 1 - 5, 3)));
     rf_synthesis_place(&f, turns);
     assert_true(search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .all = true}) == 0);
@@ -358,7 +358,7 @@ static void a_piece_at_any_angle_costs_nothing(void **state)
         }
         for (int i = 0; i < 4 * N * N; ++i)
             turns[i] = turn;
-        rf_synthesis_show(&f, &e, 0);
+        rf_synthesis_show(&f, &e, 0, (RfSynthesisHeld){0});
         rf_synthesis_place(&f, turns);
         assert_true(search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .all = true}) == 0);
         // And its doubled places are one piece.
@@ -373,6 +373,124 @@ static void a_piece_at_any_angle_costs_nothing(void **state)
         }
         rf_synthesis_frame_free(&f);
         rf_synthesis_frame_free(&fine);
+    }
+    rf_synthesis_exemplar_free(&e);
+}
+
+// The exact search knows whole pixels only: what its match means between pixels is told by the window and its pixels.
+static void an_exact_search_keeps_a_turned_piece_one_to_a_part_of_a_pixel(void **state)
+{
+    (void)state;
+    enum
+    {
+        N = 40
+    };
+    RfSynthesisExemplar e = make_exemplar(120, 120, CHANNELS, false, 5);
+    RfWindowDatabase *windows = all_windows(&e, SIDE);
+    RfSynthesisFrame f = make_piece(&e, N, N, false, 0, 0, 2);
+    static RfVec2 turns[N * N];
+    const RfVec2 turn = {cosf(0.7f), sinf(0.7f)};
+    for (int i = 0; i < N * N; ++i)
+    {
+        f.sources[i] = rf_vec2_add((RfVec2){60.3f, 29.8f}, rf_turn(turn, (RfVec2){(float)(i % N), (float)(i / N)}));
+        turns[i] = turn;
+    }
+    rf_synthesis_show(&f, &e, 0, (RfSynthesisHeld){0});
+    rf_synthesis_place(&f, turns);
+    // One that has lost its place is told it by its pixels.
+    f.windows[window_count(&f) / 2 + 9].source = (RfVec2){5.4f, 5.4f};
+    search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE, .windows = windows, .all = true});
+    for (int i = 0; i < window_count(&f); ++i)
+    {
+        RfVec2 place = f.sources[(int)f.windows[i].at.y * N + (int)f.windows[i].at.x];
+        assert_true(rf_vec2_length(rf_vec2_sub(f.windows[i].source, place)) < 1e-3f);
+    }
+    rf_windows_destroy(windows);
+    rf_synthesis_frame_free(&f);
+    rf_synthesis_exemplar_free(&e);
+}
+
+enum
+{
+    /// Channels that are no guide.
+    MADE = 2
+};
+
+// The cost of the middle window, of a frame whose places are one piece turned by half a right angle, which shows a
+// constant wherever it is held and whose last channel is a guide.
+static double cost_of_what_is_given(const RfSynthesisExemplar *e, float hold, int16_t held, int16_t guide)
+{
+    enum
+    {
+        N = 24
+    };
+    RfSynthesisFrame f = make_piece(e, N, N, false, 0, 0, 2);
+    RfFixedPicture to;
+    static float holds[N * N];
+    static RfVec2 turns[N * N];
+    assert_int_equal(rf_fixed_create(N, N, MADE, 0, &to), RF_OK);
+    for (int i = 0; i < N * N; ++i)
+    {
+        turns[i] = (RfVec2){0.70710678f, 0.70710678f};
+        f.sources[i] = rf_vec2_add((RfVec2){30, 30}, rf_turn(turns[i], (RfVec2){(float)(i % N), (float)(i / N)}));
+        holds[i] = hold;
+        for (int c = 0; c < MADE; ++c)
+            rf_fixed_at(&to, i % N, i / N)[c] = held;
+        rf_fixed_at(&f.picture, i % N, i / N)[MADE] = guide;
+    }
+    rf_synthesis_show(&f, e, 1, (RfSynthesisHeld){&to, holds});
+    for (int i = 0; i < N * N && hold > 1e5f; ++i)
+        assert_int_equal(rf_fixed_at(&f.picture, i % N, i / N)[0], held);
+    rf_synthesis_place(&f, turns);
+    RfSynthesisSearch search = {
+        .exemplar = e, .frame = &f, .side = SIDE, .guides = 1, .held = {&to, holds}, .all = true};
+    search_with(search);
+    double cost = f.windows[window_count(&f) / 2 + f.columns / 2].cost;
+    rf_fixed_free(&to);
+    rf_synthesis_frame_free(&f);
+    return cost;
+}
+
+// What is given is compared as it is, also between pixels: no part of the exemplar is added to it.
+static void what_is_given_is_seen_as_it_is_by_turned_windows(void **state)
+{
+    (void)state;
+    RfSynthesisExemplar e = make_exemplar(90, 90, MADE + 1, false, 5);
+    for (int y = 0; y < 90; ++y)
+        for (int x = 0; x < 90; ++x)
+            rf_fixed_at(&e.fixed, x, y)[MADE] = 50;
+    assert_true(cost_of_what_is_given(&e, 0, 0, 50) == 0);
+    assert_true(cost_of_what_is_given(&e, 0, 0, 53) == 9 * SIDE * SIDE);
+    for (int y = 0; y < 90; ++y)
+        for (int x = 0; x < 90; ++x)
+            for (int c = 0; c < MADE; ++c)
+                rf_fixed_at(&e.fixed, x, y)[c] = (int16_t)((x + y) % 2 ? 10 : 0);
+    // A chequered window is compared with a constant one, not with what the chequers under it would add.
+    const int more = (SIDE * SIDE + 1) / 2, fewer = SIDE * SIDE / 2;
+    assert_true(cost_of_what_is_given(&e, 1e6f, 70, 50) == MADE * (more * 60 * 60 + fewer * 70 * 70));
+    rf_synthesis_exemplar_free(&e);
+}
+
+// Its corners reach farther than those of one that is not, and one of half the scale sees twice as far.
+static void turned_windows_are_searched_again_when_their_corners_change(void **state)
+{
+    (void)state;
+    RfSynthesisExemplar e = make_exemplar(120, 120, CHANNELS, false, 5);
+    for (int k = 0; k < 3; ++k)
+    {
+        const RfVec2 turn = k == 0 ? (RfVec2){1, 0} : k == 1 ? (RfVec2){0.70710678f, 0.70710678f} : (RfVec2){0.5f, 0};
+        const int reach = k == 0 ? SIDE / 2 : k == 1 ? (int)(1.4142f * (SIDE / 2)) : SIDE;
+        static RfVec2 turns[60 * 60];
+        for (int i = 0; i < 60 * 60; ++i)
+            turns[i] = turn;
+        RfSynthesisFrame f = make_piece(&e, 60, 60, false, 20, 20, 1);
+        rf_synthesis_place(&f, turns);
+        memset(f.stirred, 0, (size_t)window_count(&f));
+        f.stirred[30 * 60 + 30 + reach] = 1;
+        f.windows[30 * 60 + 30].cost = -1;
+        search_with((RfSynthesisSearch){.exemplar = &e, .frame = &f, .side = SIDE});
+        assert_true(f.windows[30 * 60 + 30].cost >= 0);
+        rf_synthesis_frame_free(&f);
     }
     rf_synthesis_exemplar_free(&e);
 }
@@ -467,6 +585,9 @@ int main(void)
         cmocka_unit_test(a_window_that_has_lost_its_place_is_told_it_by_its_pixels),
         cmocka_unit_test(a_turned_piece_is_found_by_windows_that_are_turned_alike),
         cmocka_unit_test(a_piece_at_any_angle_costs_nothing),
+        cmocka_unit_test(an_exact_search_keeps_a_turned_piece_one_to_a_part_of_a_pixel),
+        cmocka_unit_test(what_is_given_is_seen_as_it_is_by_turned_windows),
+        cmocka_unit_test(turned_windows_are_searched_again_when_their_corners_change),
         cmocka_unit_test(only_what_is_stirred_is_searched_and_only_what_has_changed_is_made),
         cmocka_unit_test(doubled_places_of_a_piece_are_a_piece),
         cmocka_unit_test(scattered_windows_lie_inside_everywhere_and_by_their_seed),

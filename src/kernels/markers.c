@@ -307,7 +307,7 @@ static void fill_row(void *context, int y, int worker)
         if (nearest >= 0)
             from.source = rf_vec2_add(from.source, rf_bend(from.bend, step));
         if (nearest >= 0 && !is_between(m, x, y, nearest))
-            from.continued += rf_vec2_length(step);
+            from.continued = rf_min(from.continued + rf_vec2_length(step), RF_CONTINUED_MOST);
         from.at = at;
         m->pixels[own] = from;
     }

@@ -16,6 +16,8 @@ typedef struct RfBend
     RfVec2 x, y;
 } RfBend;
 
+#define RF_CONTINUED_MOST 1e6f
+
 typedef struct RfMarker
 {
     /// Pixel indices: a pixel's centre is a whole number.
@@ -24,7 +26,7 @@ typedef struct RfMarker
     /// How much of it is seen, 0 to 1; 0: there is none.
     float share;
     /// How far the texture was continued to here from where it was laid, in pixels: where the flow enters the frame,
-    /// the more the longer ago.
+    /// the more the longer ago; RF_CONTINUED_MOST at most.
     float continued;
 } RfMarker;
 

@@ -108,6 +108,7 @@ typedef struct Show
 {
     RfSynthesisFrame *frame;
     const RfSynthesisExemplar *exemplar;
+    RfSynthesisHeld held;
     int channels;
 } Show;
 
@@ -122,14 +123,16 @@ static void show_row(void *context, int y, int worker)
         if (!e->tiles) // a level of odd size is not quite half the next one
             *source =
                 (RfVec2){rf_clamp(source->x, 0, (float)(e->width - 1)), rf_clamp(source->y, 0, (float)(e->height - 1))};
-        memcpy(rf_fixed_at(&s->frame->picture, x, y), rf_synthesis_pixel(e, *source),
-               (size_t)s->channels * sizeof(int16_t));
+        int16_t *pixel = rf_fixed_at(&s->frame->picture, x, y);
+        memcpy(pixel, rf_synthesis_pixel(e, *source), (size_t)s->channels * sizeof *pixel);
+        for (int c = 0; c < s->channels && s->held.hold; ++c)
+            pixel[c] = (int16_t)lrintf(rf_synthesis_hold(&s->held, s->frame->width, x, y, c, pixel[c]));
     }
 }
 
-void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int guides)
+void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int guides, RfSynthesisHeld held)
 {
-    Show show = {frame, exemplar, exemplar->channels - guides};
+    Show show = {frame, exemplar, held, exemplar->channels - guides};
     rf_parallel_for(frame->height, show_row, &show);
     rf_fixed_extend(&frame->picture, frame->tiles);
 }

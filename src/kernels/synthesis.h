@@ -77,9 +77,8 @@ static inline RfVec2 rf_turn_back(RfVec2 turn, RfVec2 step)
 /// The exemplar's pixel nearest to a place; beyond a border its last one, or round the other side where it tiles.
 static inline const int16_t *rf_synthesis_pixel(const RfSynthesisExemplar *exemplar, RfVec2 place)
 {
-    int x = (int)floorf(place.x + 0.5f), y = (int)floorf(place.y + 0.5f);
-    return rf_fixed_at(&exemplar->fixed, rf_border_int(x, exemplar->width, exemplar->tiles),
-                       rf_border_int(y, exemplar->height, exemplar->tiles));
+    return rf_fixed_at(&exemplar->fixed, rf_border_int(rf_nearest_int(place.x), exemplar->width, exemplar->tiles),
+                       rf_border_int(rf_nearest_int(place.y), exemplar->height, exemplar->tiles));
 }
 
 /// Takes over `pixels`, also on failure. coarse: the level of half the size, or NULL. similar: places a list.
@@ -106,8 +105,24 @@ void rf_synthesis_place(RfSynthesisFrame *frame, const RfVec2 *turns);
 void rf_synthesis_scatter(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int side, uint64_t seed);
 /// Doubles the sources of a coarser frame. turns: of the finer one's pixels, as above.
 void rf_synthesis_refine(const RfSynthesisFrame *coarse, const RfVec2 *turns, RfSynthesisFrame *fine);
-/// Sets the picture from the sources, but for its last `guides` channels.
-void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int guides);
+/// What pixels are held to and how strongly, against a weight of 1 of what the exemplar says.
+typedef struct RfSynthesisHeld
+{
+    /// Channels without the guides.
+    const RfFixedPicture *to;
+    /// [height][width]; NULL: nothing is held.
+    const float *hold;
+} RfSynthesisHeld;
+
+/// A channel's value where the exemplar says `value`.
+static inline float rf_synthesis_hold(const RfSynthesisHeld *held, int width, int x, int y, int channel, float value)
+{
+    float hold = held->hold[(ptrdiff_t)y * width + x];
+    return (value + hold * rf_fixed_at(held->to, x, y)[channel]) / (1 + hold);
+}
+
+/// Sets the picture from the sources and what they are held to, but for its last `guides` channels.
+void rf_synthesis_show(RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int guides, RfSynthesisHeld held);
 
 /// Moves the prices by where the frame's windows, of this side, come from.
 void rf_synthesis_settle_prices(const RfSynthesisFrame *frame, const RfSynthesisExemplar *exemplar, int side,
@@ -137,7 +152,7 @@ typedef struct RfSynthesisSearch
     const float *variations;
     /// As in RfSynthesisAssign.
     int guides;
-    const float *hold;
+    RfSynthesisHeld held;
     /// Whole pixels only, and nothing turned: the fast path.
     bool plain;
     /// Windows where nothing has changed too.
@@ -171,10 +186,8 @@ typedef struct RfSynthesisAssign
     bool all;
     /// Channels at the end of the picture that are given, not made.
     int guides;
-    /// What pixels are held to and how strongly, against a weight of 1 of all windows over a pixel together:
-    /// [height][width]. NULL: to nothing.
-    const RfFixedPicture *held;
-    const float *hold;
+    /// Against a weight of 1 of all windows over a pixel together.
+    RfSynthesisHeld held;
 } RfSynthesisAssign;
 
 /// Makes sources and picture from the windows.

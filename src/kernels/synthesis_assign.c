@@ -169,12 +169,8 @@ static void mean_of_votes(const Assigning *a, Ballot *b, int x, int y, float tot
             for (int c = 0; c < a->channels; ++c)
                 mean[c] += b->weight[g] / total * b->pixel[g][c];
         }
-    if (!assign->held)
-        return;
-    float hold = assign->hold[(ptrdiff_t)y * assign->frame->width + x];
-    const int16_t *held = rf_fixed_at(assign->held, x, y);
-    for (int c = 0; c < a->channels; ++c)
-        mean[c] = (mean[c] + hold * held[c]) / (1 + hold);
+    for (int c = 0; c < a->channels && assign->held.hold; ++c)
+        mean[c] = rf_synthesis_hold(&assign->held, assign->frame->width, x, y, c, mean[c]);
 }
 
 static int nearest_group(const Assigning *a, const Ballot *b, const float *mean)
@@ -217,19 +213,19 @@ static bool assign_pixel(const Assigning *a, Ballot *b, int x, int y)
     int16_t *pixel = rf_fixed_at(&assign->frame->picture, x, y);
     int best = nearest_group(a, b, mean);
     bool other = set_source(&assign->frame->sources[(ptrdiff_t)y * assign->frame->width + x], b->place[best]);
-    for (int c = 0; c < a->channels && (assign->mean || assign->held); ++c)
+    if (!assign->mean && !assign->held.hold)
     {
-        float hold = assign->held ? assign->hold[(ptrdiff_t)y * assign->frame->width + x] : 0;
+        memcpy(pixel, b->pixel[best], (size_t)a->channels * sizeof *pixel);
+        return other;
+    }
+    for (int c = 0; c < a->channels; ++c)
+    {
         float value =
-            assign->mean ? mean[c]
-                         : ((float)b->pixel[best][c] + hold * (assign->held ? rf_fixed_at(assign->held, x, y)[c] : 0)) /
-                               (1 + hold);
+            assign->mean ? mean[c] : rf_synthesis_hold(&assign->held, assign->frame->width, x, y, c, b->pixel[best][c]);
         int16_t now = (int16_t)lrintf(value);
         other |= now != pixel[c];
         pixel[c] = now;
     }
-    if (!assign->mean && !assign->held)
-        memcpy(pixel, b->pixel[best], (size_t)a->channels * sizeof *pixel);
     return other;
 }
 
@@ -296,7 +292,7 @@ static void assign_row(void *context, int row, int worker)
         if (assign->all || has_changed(a, i, row))
         {
             hear(a, i, row, b);
-            if (b->groups == 1 && !assign->held && !assign->mean)
+            if (b->groups == 1 && !assign->held.hold && !assign->mean)
                 other = copy_cell(a, b, x0, y0, x1, y1);
             else
                 for (int y = y0; y < y1; ++y)

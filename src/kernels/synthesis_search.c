@@ -6,7 +6,8 @@
 // is one place picked at random. Only these are compared, in fixed point, whatever the exemplar's size. The exact
 // search (kernels/neighbours.h) compares with all.
 //
-// A window that reaches over the frame's border is compared as the nearest one that does not.
+// A window that reaches over the frame's border is compared as the nearest one that does not; a turned or enlarged one
+// may still reach over it, and sees there what continues the border's pixels.
 #include "core/maths.h"
 #include "core/memory.h"
 #include "core/parallel.h"
@@ -83,11 +84,6 @@ static float bring_inside(float at, int n, int half, bool tiles)
     return at >= (float)n - 0.5f ? at - (float)n : rf_max(at, -0.5f);
 }
 
-static int whole(float at)
-{
-    return (int)floorf(at + 0.5f);
-}
-
 // Adds the place unless its pixel is there already.
 static void add(const Walk *walk, Candidates *c, RfVec2 place)
 {
@@ -115,7 +111,7 @@ static void add_similar(const Walk *walk, Candidates *c)
     for (int i = 0; i < told; ++i)
     {
         RfVec2 place = c->places[i];
-        int x = whole(place.x), y = whole(place.y);
+        int x = rf_nearest_int(place.x), y = rf_nearest_int(place.y);
         const RfPlace *list = rf_similar_at(similar, x, y);
         for (int k = 0; k < similar->count; ++k)
             add(walk, c, (RfVec2){place.x + (float)(list[k].x - x), place.y + (float)(list[k].y - y)});
@@ -138,8 +134,8 @@ static RfVec2 compared_at(const Walk *walk, const RfSynthesisWindow *window)
 {
     const RfSynthesisFrame *f = walk->search->frame;
     int half = f->tiles ? 0 : walk->half;
-    return (RfVec2){(float)rf_clamp_int(whole(window->at.x), half, f->width - 1 - half),
-                    (float)rf_clamp_int(whole(window->at.y), half, f->height - 1 - half)};
+    return (RfVec2){(float)rf_clamp_int(rf_nearest_int(window->at.x), half, f->width - 1 - half),
+                    (float)rf_clamp_int(rf_nearest_int(window->at.y), half, f->height - 1 - half)};
 }
 
 static void add_coherent(const Walk *walk, Candidates *c, const RfSynthesisWindow *window, RfVec2 at)
@@ -150,7 +146,7 @@ static void add_coherent(const Walk *walk, Candidates *c, const RfSynthesisWindo
         {
             RfVec2 step = {(float)walk->asked[i], (float)walk->asked[j]};
             RfVec2 point = rf_vec2_add(at, walk->search->plain ? step : rf_turn_back(window->turn, step));
-            int x = whole(point.x), y = whole(point.y);
+            int x = rf_nearest_int(point.x), y = rf_nearest_int(point.y);
             RfVec2 source = f->sources[(ptrdiff_t)rf_border_int(y, f->height, f->tiles) * f->width +
                                        rf_border_int(x, f->width, f->tiles)];
             RfVec2 rest = rf_turn(window->turn, (RfVec2){point.x - (float)x, point.y - (float)y});
@@ -167,7 +163,7 @@ static void see(const Walk *walk, RfVec2 turn, RfVec2 point, int16_t *out)
 {
     const RfSynthesisFrame *f = walk->search->frame;
     const RfSynthesisExemplar *e = walk->search->exemplar;
-    int x = whole(point.x), y = whole(point.y);
+    int x = rf_nearest_int(point.x), y = rf_nearest_int(point.y);
     int px = rf_border_int(x, f->width, f->tiles), py = rf_border_int(y, f->height, f->tiles);
     const int16_t *pixel = rf_fixed_at(&f->picture, px, py);
     if (walk->search->plain)
@@ -181,7 +177,7 @@ static void see(const Walk *walk, RfVec2 turn, RfVec2 point, int16_t *out)
     RfVec2 rest = rf_turn(turn, rf_vec2_sub(point, from));
     const int16_t *own = rf_synthesis_pixel(e, source);
     const int16_t *there = rf_synthesis_pixel(e, rf_vec2_add(source, rest));
-    const float *hold = walk->search->hold;
+    const float *hold = walk->search->held.hold;
     float part = hold ? 1 / (1 + hold[(ptrdiff_t)py * f->width + px]) : 1;
     int made = f->picture.channels - walk->search->guides;
     for (int c = 0; c < made; ++c)
@@ -227,8 +223,21 @@ static void settle(RfSynthesisWindow *window, RfVec2 at, RfVec2 place, float cos
     window->cost = cost;
 }
 
-static bool is_stirred(const RfSynthesisFrame *f, int column, int row, int reach)
+// In cells. The corners of a turned window are the farthest, and a smaller turn is a larger window.
+static int reach_of(const Walk *walk, const RfSynthesisWindow *window)
 {
+    const RfSynthesisFrame *f = walk->search->frame;
+    if (walk->search->plain)
+        return (walk->half + f->spacing - 1) / f->spacing;
+    float pixels = 1.41421356f * (float)walk->half / rf_vec2_length(window->turn);
+    return (int)ceilf(rf_min(pixels, RF_MAX_SIZE) / (float)f->spacing);
+}
+
+// True if what the window sees has changed.
+static bool is_stirred(const Walk *walk, int column, int row)
+{
+    const RfSynthesisFrame *f = walk->search->frame;
+    int reach = reach_of(walk, &f->windows[(ptrdiff_t)row * f->columns + column]);
     for (int j = row - reach; j <= row + reach; ++j)
         for (int i = column - reach; i <= column + reach; ++i)
         {
@@ -260,7 +269,6 @@ static void search_row(void *context, int row, int worker)
 {
     const Walk *walk = context;
     RfSynthesisFrame *f = walk->search->frame;
-    int reach = (walk->half + f->spacing - 1) / f->spacing;
     double *sums = walk->sums[row];
     for (int i = 0; i < f->columns; ++i)
     {
@@ -268,7 +276,7 @@ static void search_row(void *context, int row, int worker)
         if (!window->exists)
             continue;
         window->changed = false;
-        if (walk->search->all || is_stirred(f, i, row, reach))
+        if (walk->search->all || is_stirred(walk, i, row))
         {
             search_window(walk, window, row * f->columns + i, &walk->scratch[worker]);
             sums[1] += (double)window->cost;
@@ -312,11 +320,11 @@ static RfVec2 place_of_match(const Walk *walk, const RfSynthesisWindow *window, 
     x = rf_border_int(x, e->width, e->tiles);
     y = rf_border_int(y, e->height, e->tiles);
     RfVec2 own = rf_vec2_add(window->source, rf_turn(window->turn, rf_vec2_sub(at, window->at)));
-    RfVec2 place = {(float)x + own.x - (float)whole(own.x), (float)y + own.y - (float)whole(own.y)};
+    RfVec2 place = {(float)x + own.x - (float)rf_nearest_int(own.x), (float)y + own.y - (float)rf_nearest_int(own.y)};
     add(walk, c, own);
     add_coherent(walk, c, window, at);
     for (int i = 0; i < c->count; ++i)
-        if (whole(c->places[i].x) == x && whole(c->places[i].y) == y)
+        if (rf_nearest_int(c->places[i].x) == x && rf_nearest_int(c->places[i].y) == y)
             place = c->places[i];
     forget(c);
     return place;

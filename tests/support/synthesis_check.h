@@ -42,7 +42,7 @@ static inline RfSynthesisFrame make_piece(const RfSynthesisExemplar *e, int widt
     assert_int_equal(rf_synthesis_frame_create(width, height, e->channels, tiles, &f), RF_OK);
     for (int i = 0; i < width * height; ++i)
         f.sources[i] = (RfVec2){(float)(x + i % width), (float)(y + i / width)};
-    rf_synthesis_show(&f, e, 0);
+    rf_synthesis_show(&f, e, 0, (RfSynthesisHeld){0});
     assert_int_equal(rf_synthesis_cut(&f, spacing), RF_OK);
     rf_synthesis_place(&f, NULL);
     return f;

@@ -136,7 +136,7 @@ static bool is_sound(const RfOptimize *o, const Record *r, size_t number, size_t
         return false;
     bool near = fabsf(r->at.x - (float)(r->pixel % width)) <= 1 && fabsf(r->at.y - (float)(r->pixel / width)) <= 1;
     return near && is_finite(r->source) && is_finite(r->bend.x) && is_finite(r->bend.y) && r->share > 0 &&
-           r->share <= 1 && r->continued >= 0 && r->continued < INFINITY;
+           r->share <= 1 && r->continued >= 0 && r->continued <= RF_CONTINUED_MOST;
 }
 
 static RfResult restore(RfOptimize *o, const StateHeader *h, const uint8_t *rest, size_t size)

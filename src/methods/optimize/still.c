@@ -317,6 +317,12 @@ static bool is_turned(const Still *s)
     return s->bounds[s->level].turns != NULL;
 }
 
+static RfSynthesisHeld held_of(const Still *s)
+{
+    const Bounds *b = &s->bounds[s->level];
+    return (RfSynthesisHeld){&b->held, b->hold};
+}
+
 static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *energy)
 {
     RfSynthesisSearch search = {
@@ -327,7 +333,7 @@ static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *en
         .variations = s->variations,
         .prices = round > 0 && s->options->spread > 0 ? s->prices : NULL,
         .guides = s->material.guides,
-        .hold = s->bounds[s->level].hold,
+        .held = held_of(s),
         .plain = !is_turned(s),
         .all = all,
         .seed = s->options->seed,
@@ -338,7 +344,6 @@ static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *en
 
 static RfResult assign_step(Still *s, bool robust, bool all)
 {
-    const Bounds *b = &s->bounds[s->level];
     RfSynthesisAssign assign = {
         .exemplar = &s->material.levels[s->level],
         .frame = &s->frame,
@@ -348,8 +353,7 @@ static RfResult assign_step(Still *s, bool robust, bool all)
         .together = is_turned(s) ? TURNED_TOGETHER : 0,
         .all = all,
         .guides = s->material.guides,
-        .held = b->target ? &b->held : NULL,
-        .hold = b->hold,
+        .held = held_of(s),
     };
     return rf_synthesis_assign(&assign);
 }
@@ -422,7 +426,7 @@ static RfResult start_level(Still *s, bool start)
     s->prices = rf_allocate((size_t)m->levels[s->level].width * (size_t)m->levels[s->level].height, sizeof *s->prices);
     if (!s->prices)
         return RF_OUT_OF_MEMORY;
-    rf_synthesis_show(&s->frame, &m->levels[s->level], m->guides);
+    rf_synthesis_show(&s->frame, &m->levels[s->level], m->guides, held_of(s));
     show_guide(s);
     rf_fixed_extend(&s->frame.picture, s->options->tile);
     return RF_OK;
