@@ -59,6 +59,9 @@ typedef struct Uses
     double border_roughness;
     /// The lagrangian method's default, and the largest it takes; 0: any.
     double radius, largest_radius;
+    /// Main direction in degrees, how much of one it has, 0 to 1, and whether that is too little. NAN: too small.
+    double direction, directionality;
+    bool isotropic;
     /// "R,G": its channels are as those of a flow, and there are no others.
     const char *flow;
 } Uses;
@@ -74,6 +77,20 @@ static const char *flow_channels(const RfImage *image)
     return NULL;
 }
 
+static void judge_direction(const RfExemplar *exemplar, Uses *uses)
+{
+    RfDirectionalOptions options = rf_directional_defaults();
+    RfDirectional *directional = NULL;
+    uses->direction = uses->directionality = NAN;
+    if (rf_directional_create(exemplar, &options, &directional) != RF_OK)
+        return;
+    RfDirectionalStats stats = rf_directional_stats(directional);
+    uses->direction = (double)stats.direction;
+    uses->directionality = (double)stats.directionality;
+    uses->isotropic = stats.isotropic;
+    rf_directional_destroy(directional);
+}
+
 /// The sizes in grids and radii are those of rf_lagrangian_create.
 static void judge_exemplar(const RfExemplar *exemplar, Uses *uses)
 {
@@ -86,6 +103,7 @@ static void judge_exemplar(const RfExemplar *exemplar, Uses *uses)
     uses->largest_radius = uses->tiles ? 0 : floor(10 * side / least_sides) / 10;
     double fits = uses->tiles ? floor(10 * side / least_sides_tiling) / 10 : uses->largest_radius;
     uses->radius = fmax(2, fmin(default_radius, fits));
+    judge_direction(exemplar, uses);
 }
 
 /// Images that are no exemplar (too small, without colour, not finite) have no uses; that is no failure.
@@ -117,6 +135,10 @@ static void print_uses_json(const Uses *uses)
         print_json_number(stdout, uses->border_roughness);
         printf(",\"particle_radius\":%g,\"largest_particle_radius\":", uses->radius);
         print_json_number(stdout, uses->largest_radius > 0 ? uses->largest_radius : NAN);
+        fputs(",\"direction\":", stdout);
+        print_json_number(stdout, uses->isotropic ? NAN : uses->direction);
+        fputs(",\"directionality\":", stdout);
+        print_json_number(stdout, uses->directionality);
         fputc('}', stdout);
     }
     if (uses->flow)
@@ -138,6 +160,11 @@ static void print_uses(const Uses *uses)
         printf("  particle radius: %g unless given, any fits\n", uses->radius);
     else
         printf("  particle radius: %g unless given, %g at most\n", uses->radius, uses->largest_radius);
+    if (uses->isotropic)
+        printf("  main direction: none to be seen (directionality %.2f)\n", uses->directionality);
+    else if (!isnan(uses->direction))
+        printf("  main direction: %.0f degrees, clockwise from the x axis (directionality %.2f)\n", uses->direction,
+               uses->directionality);
 }
 
 static void print_image_json(const ImageInput *input, const RfImage *image)

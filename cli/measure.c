@@ -300,7 +300,8 @@ static int judge_one(Judging *judging, int index)
     if (code)
         return code;
     ++judging->report.count;
-    progress_frame(&judging->progress, judging->report.numbers[index], judging->seconds, NULL, 0);
+    FrameReport report = {.stage_count = 0};
+    progress_frame(&judging->progress, judging->report.numbers[index], judging->seconds, &report);
     return CODE_DONE;
 }
 

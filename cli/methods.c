@@ -2,6 +2,7 @@
 #include "methods.h"
 
 #include <assert.h>
+#include <stdio.h>
 #include <string.h>
 
 // The verbs of a method, behind one type for all of them.
@@ -57,6 +58,8 @@
 METHOD_VERBS(lagrangian, RfLagrangian)
 METHOD_VERBS(optimize, RfOptimize)
 METHOD_DEFAULTS(optimize, RfOptimize)
+METHOD_VERBS(directional, RfDirectional)
+METHOD_DEFAULTS(directional, RfDirectional)
 METHOD_VERBS(eulerian, RfEulerian)
 METHOD_DEFAULTS(eulerian, RfEulerian)
 METHOD_VERBS(dual, RfDual)
@@ -77,49 +80,78 @@ static RfResult lagrangian_layers(const void *method, const RfImageView *layers)
     return rf_lagrangian_layers(method, layers);
 }
 
-static int particle_stages(RfLagrangianStats stats, Stage stages[MAX_STAGES])
+static void add_stage(FrameReport *report, const char *name, double seconds)
 {
-    stages[0] = (Stage){"advect", stats.advect_seconds};
-    stages[1] = (Stage){"distribute", stats.distribute_seconds};
-    stages[2] = (Stage){"draw", stats.draw_seconds};
-    return 3;
+    report->stages[report->stage_count++] = (Stage){name, seconds};
 }
 
-static int lagrangian_stages(const void *method, Stage stages[MAX_STAGES])
+static void add_figure(FrameReport *report, const char *name, double value)
 {
-    return particle_stages(rf_lagrangian_stats(method), stages);
+    report->figures[report->figure_count++] = (Figure){name, value};
 }
 
-static int sprites_stages(const void *method, Stage stages[MAX_STAGES])
+static void tell_particles(RfLagrangianStats stats, FrameReport *report)
 {
-    return particle_stages(rf_sprites_stats(method), stages);
+    add_stage(report, "advect", stats.advect_seconds);
+    add_stage(report, "distribute", stats.distribute_seconds);
+    add_stage(report, "draw", stats.draw_seconds);
 }
 
-static int optimize_stages(const void *method, Stage stages[MAX_STAGES])
+static void lagrangian_report(const void *method, FrameReport *report)
+{
+    tell_particles(rf_lagrangian_stats(method), report);
+}
+
+static void sprites_report(const void *method, FrameReport *report)
+{
+    tell_particles(rf_sprites_stats(method), report);
+}
+
+static void optimize_report(const void *method, FrameReport *report)
 {
     RfOptimizeStats stats = rf_optimize_stats(method);
-    stages[0] = (Stage){"carry", stats.carry_seconds};
-    stages[1] = (Stage){"search", stats.search_seconds};
-    stages[2] = (Stage){"draw", stats.draw_seconds};
-    return 3;
+    add_stage(report, "carry", stats.carry_seconds);
+    add_stage(report, "search", stats.search_seconds);
+    add_stage(report, "draw", stats.draw_seconds);
+    add_figure(report, "energy", stats.energy);
+    add_figure(report, "patches", stats.patches);
 }
 
-// The last three differ: presets, layers, stages.
-#define METHOD(name, sentence, presets, layers, stages)                                                                \
+static void directional_report(const void *method, FrameReport *report)
+{
+    RfDirectionalStats stats = rf_directional_stats(method);
+    add_stage(report, "move", stats.move_seconds);
+    add_stage(report, "fill", stats.fill_seconds);
+    add_stage(report, "renew", stats.renew_seconds);
+    add_figure(report, "filled", (double)stats.filled);
+    add_figure(report, "continued", (double)stats.continued);
+    add_figure(report, "renewed", (double)stats.renewed);
+    if (stats.isotropic)
+        snprintf(report->remark, sizeof report->remark,
+                 "has no main direction to be seen (directionality %.2f): the texture will not show the flow's; "
+                 "--method optimize or lagrangian suit it better",
+                 (double)stats.directionality);
+}
+
+// The last three differ: presets, layers, report.
+#define METHOD(name, sentence, presets, layers, report)                                                                \
     {                                                                                                                  \
 #name, sentence, presets, rf_##name##_option_table, name##_defaults, name##_create, name##_step,               \
-            name##_advance, name##_save, name##_load, name##_destroy, layers, stages                                   \
+            name##_advance, name##_save, name##_load, name##_destroy, layers, report                                   \
     }
 
 static const Method g_methods[] = {
     METHOD(lagrangian, "textured grids that follow the flow, fade in and out and are blended: the spectrum stays",
-           "default|paper", lagrangian_layers, lagrangian_stages),
+           "default|paper", lagrangian_layers, lagrangian_report),
     METHOD(optimize,
            "a still that the flow carries and bends, and pieces of the exemplar that fit where it is worn: shapes stay",
-           NULL, NULL, optimize_stages),
+           NULL, NULL, optimize_report),
+    METHOD(directional,
+           "pieces of the exemplar, turned downstream, that the flow carries and does not bend: canes point along it",
+           NULL, NULL, directional_report),
     METHOD(eulerian, "layers of carried coordinates, regenerated sooner where the flow deforms more", NULL, NULL, NULL),
     METHOD(dual, "two layers of carried coordinates that start afresh in turn", NULL, NULL, NULL),
-    METHOD(sprites, "round pieces of the exemplar that the flow carries and does not bend", NULL, NULL, sprites_stages),
+    METHOD(sprites, "round pieces of the exemplar that the flow carries and does not bend", NULL, NULL, sprites_report),
     METHOD(warp, "coordinates carried for ever: follows exactly and stretches without end", NULL, NULL, NULL),
 };
 

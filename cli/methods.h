@@ -7,6 +7,7 @@
 enum
 {
     MAX_STAGES = 4,
+    MAX_FIGURES = 4,
     /// Room for the largest options struct, checked when the table is used.
     METHOD_OPTIONS_SIZE = 256
 };
@@ -17,6 +18,23 @@ typedef struct Stage
     const char *name;
     double seconds;
 } Stage;
+
+typedef struct Figure
+{
+    const char *name;
+    double value;
+} Figure;
+
+/// What a method tells of a frame: how long its parts took, and figures of its own.
+typedef struct FrameReport
+{
+    Stage stages[MAX_STAGES];
+    int stage_count;
+    Figure figures[MAX_FIGURES];
+    int figure_count;
+    /// What the user should know before anything is made; empty: nothing.
+    char remark[200];
+} FrameReport;
 
 /// A method's options struct, whichever it is.
 typedef union MethodOptions
@@ -43,8 +61,8 @@ typedef struct Method
     void (*destroy)(void *method);
     /// NULL: the method has no layers to write.
     RfResult (*layers)(const void *method, const RfImageView *layers);
-    /// The last step's times; NULL: the whole step is one stage.
-    int (*stages)(const void *method, Stage stages[MAX_STAGES]);
+    /// Of the last step; NULL: there is nothing to tell.
+    void (*report)(const void *method, FrameReport *report);
 } Method;
 
 const Method *method_table(int *count);

@@ -91,34 +91,45 @@ void progress_stage(Progress *progress, const char *stage)
         draw_bar(progress, stage);
 }
 
-static void tell_json(int frame, double seconds, const Stage *stages, int stage_count)
+static void tell_json(int frame, double seconds, const FrameReport *report)
 {
     fprintf(stderr, "{\"event\":\"frame\",\"frame\":%d,\"ms\":", frame);
     print_json_number(stderr, 1e3 * seconds);
     fputs(",\"stages\":{", stderr);
-    for (int i = 0; i < stage_count; ++i)
+    for (int i = 0; i < report->stage_count; ++i)
     {
         fputs(i ? "," : "", stderr);
-        print_json_text(stderr, stages[i].name);
+        print_json_text(stderr, report->stages[i].name);
         fputc(':', stderr);
-        print_json_number(stderr, 1e3 * stages[i].seconds);
+        print_json_number(stderr, 1e3 * report->stages[i].seconds);
     }
-    fputs("}}\n", stderr);
+    fputc('}', stderr);
+    for (int i = 0; i < report->figure_count; ++i)
+    {
+        fputc(',', stderr);
+        print_json_text(stderr, report->figures[i].name);
+        fputc(':', stderr);
+        print_json_number(stderr, report->figures[i].value);
+    }
+    fputs("}\n", stderr);
 }
 
-static void tell_line(Progress *progress, int frame, double seconds, const Stage *stages, int stage_count)
+static void tell_line(Progress *progress, int frame, double seconds, const FrameReport *report)
 {
     char rate[96];
     format_rate(progress, rate, sizeof rate);
     fprintf(stderr, "frame %d (%d of %d): %.1f ms", frame, progress->made_before + progress->made, progress->total,
             1e3 * seconds);
-    for (int i = 0; i < stage_count && progress->verbose; ++i)
-        fprintf(stderr, "%s%s %.1f", i ? ", " : " (", stages[i].name, 1e3 * stages[i].seconds);
-    fprintf(stderr, "%s, %s\n", stage_count > 0 && progress->verbose ? ")" : "", rate);
+    const char *between = " (";
+    for (int i = 0; i < report->stage_count && progress->verbose; ++i, between = ", ")
+        fprintf(stderr, "%s%s %.1f", between, report->stages[i].name, 1e3 * report->stages[i].seconds);
+    for (int i = 0; i < report->figure_count && progress->verbose; ++i, between = ", ")
+        fprintf(stderr, "%s%s %.3g", between, report->figures[i].name, report->figures[i].value);
+    fprintf(stderr, "%s, %s\n", between[0] == ',' ? ")" : "", rate);
     progress->told = now_seconds();
 }
 
-void progress_frame(Progress *progress, int frame, double seconds, const Stage *stages, int stage_count)
+void progress_frame(Progress *progress, int frame, double seconds, const FrameReport *report)
 {
     if (progress->made == 0)
         progress->first_seconds = seconds;
@@ -128,11 +139,11 @@ void progress_frame(Progress *progress, int frame, double seconds, const Stage *
     progress->last_frame = frame;
     double silent = now_seconds() - progress->told;
     if (progress->kind == PROGRESS_JSON)
-        tell_json(frame, seconds, stages, stage_count);
+        tell_json(frame, seconds, report);
     else if (progress->kind == PROGRESS_BAR && silent >= g_bar_every)
         draw_bar(progress, "");
     if (progress->kind == PROGRESS_PLAIN && (progress->verbose || silent >= g_line_every))
-        tell_line(progress, frame, seconds, stages, stage_count);
+        tell_line(progress, frame, seconds, report);
 }
 
 static double peak_mib(void)

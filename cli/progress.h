@@ -28,7 +28,7 @@ void progress_begin(Progress *progress, const Settings *settings, int total, int
 /// What goes on now; only the bar shows it.
 void progress_stage(Progress *progress, const char *stage);
 /// A frame is computed and written. seconds: of computing alone.
-void progress_frame(Progress *progress, int frame, double seconds, const Stage *stages, int stage_count);
+void progress_frame(Progress *progress, int frame, double seconds, const FrameReport *report);
 /// Removes the bar, so that a line can be printed.
 void progress_clear(Progress *progress);
 void progress_done(Progress *progress);

@@ -107,7 +107,7 @@ static int compute(void *context)
     FrameSlot *slot = job->slot;
     rf_set_progress(&job->telling->progress);
     double start = now_seconds();
-    slot->stage_count = 0;
+    slot->report = (FrameReport){.stage_count = 0};
     slot->seconds = 0;
     int code = job->source->produce(job->source->context, job->index, job->frame, job->drawn, slot);
     slot->busy_seconds = now_seconds() - start;
@@ -184,7 +184,7 @@ static int finish_frame(Run *run, int index)
     rf_free(slot->block);
     slot->block = NULL;
     if (!code && job->drawn)
-        progress_frame(&run->progress, job->frame, slot->seconds, slot->stages, slot->stage_count);
+        progress_frame(&run->progress, job->frame, slot->seconds, &slot->report);
     return code;
 }
 

@@ -31,8 +31,7 @@ typedef struct FrameSlot
     float *velocity;
     uint8_t *mask;
     Layout layout;
-    Stage stages[MAX_STAGES];
-    int stage_count;
+    FrameReport report;
     /// Computing alone, as the source measures it; and all it took, reading or simulating its inputs included.
     double seconds, busy_seconds;
     /// The source's state behind this frame, where it was asked for; from malloc by rf_free's rules.

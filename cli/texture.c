@@ -81,8 +81,8 @@ static RfResult draw(Texture *texture, const RfFlowView *flow, FrameSlot *slot)
     if (result != RF_OK)
         return result;
     rf_image_set_origin(slot->pixels, slot->layout.format, RF_ENCODING_SRGB);
-    if (texture->method->stages)
-        slot->stage_count = texture->method->stages(texture->state, slot->stages);
+    if (texture->method->report)
+        texture->method->report(texture->state, &slot->report);
     if (!texture->settings->uv)
         return RF_OK;
     result = make_uv(texture, &slot->uv);
@@ -189,6 +189,11 @@ static void tell_texture(const Texture *texture, const FramePlan *plan)
          rf_threads(), rf_threads() == 1 ? "" : "s");
     flow_input_warn_of_size(&texture->flow, settings, texture->width, texture->height);
     flow_input_warn_of_speed(&texture->flow, settings);
+    FrameReport report = {.stage_count = 0};
+    if (texture->method->report)
+        texture->method->report(texture->state, &report);
+    if (report.remark[0])
+        warn(settings, settings->words[1], "%s", report.remark);
     if (info->filled_vectors > 0)
         warn(settings, settings->words[0], "%d invalid vector%s filled from %s neighbours", info->filled_vectors,
              info->filled_vectors == 1 ? " was" : "s were", info->filled_vectors == 1 ? "its" : "their");

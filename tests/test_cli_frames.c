@@ -46,10 +46,11 @@ static void every_verb_makes_what_it_says(void **state)
 static void a_frames_hash_does_not_depend_on_the_number_of_threads(void **state)
 {
     (void)state;
-    static const char *const methods[] = {"lagrangian", "optimize", "eulerian", "dual", "sprites", "warp"};
+    static const char *const methods[] = {"lagrangian", "optimize", "directional", "eulerian",
+                                          "dual",       "sprites",  "warp"};
     static const int threads[] = {1, 2, 3, 8};
     TestFolder folder = test_folder_make();
-    for (int m = 0; m < 5; ++m)
+    for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m)
     {
         char *first = NULL;
         for (int t = 0; t < 4; ++t)

@@ -410,21 +410,22 @@ static void equal_channels_are_compared_once_with_their_weights_sum(void **state
         RfExemplar *e = noise_exemplar(16, 16, pairs);
         RfSynthesisMaterial m;
         assert_int_equal(rf_synthesis_material_create(e, 1, 1, &m), RF_OK);
-        assert_int_equal(m.channels, pairs ? 2 : 4);
+        assert_int_equal(m.comparison.channels, pairs ? 2 : 4);
         const RfMapView map = rf_exemplar_map(e, 0, NULL);
         for (int i = 0; i < 255; ++i)
         {
             double compared = 0, all = 0;
-            for (int c = 0; c < m.channels; ++c)
-                compared += pow(
-                    (double)(m.levels[0].pixels[(i + 1) * m.channels + c] - m.levels[0].pixels[i * m.channels + c]), 2);
+            for (int c = 0; c < m.comparison.channels; ++c)
+                compared += pow((double)(m.levels[0].pixels[(i + 1) * m.comparison.channels + c] -
+                                         m.levels[0].pixels[i * m.comparison.channels + c]),
+                                2);
             for (int c = 0; c < 4; ++c)
                 all += 2 * pow((double)(map.image.pixels[(i + 1) * 4 + c] - map.image.pixels[i * 4 + c]), 2);
             assert_true(fabs(compared - all) < 1e-5 * all);
         }
         // Room is left for what goes beyond the exemplar's range.
         for (int i = 0; i < 16 * 16; ++i)
-            for (int c = 0; c < m.channels; ++c)
+            for (int c = 0; c < m.comparison.channels; ++c)
                 assert_true(abs(rf_fixed_at(&m.levels[0].fixed, i % 16, i / 16)[c]) < RF_FIXED_RANGE / 2);
         rf_synthesis_material_free(&m);
         rf_exemplar_destroy(e);

@@ -22,7 +22,7 @@ enum
     LAST = TEST_SANITIZED ? 24 : 40
 };
 
-static const char *const g_names[] = {"lagrangian", "optimize", "eulerian", "dual", "sprites", "warp"};
+static const char *const g_names[] = {"lagrangian", "optimize", "directional", "eulerian", "dual", "sprites", "warp"};
 
 enum
 {
@@ -175,6 +175,8 @@ static void directions_turn_with_the_texture(void **state)
     for (int m = 0; m < METHODS; ++m)
     {
         const Stepper *stepper = stepper_find(g_names[m]);
+        if (strcmp(stepper->name, "directional") == 0)
+            continue; // its texture lies as the flow does, not as it lay before
         void *method = make(stepper, exemplar);
         SceneMoments moments = scene_moments(scene_rotation, N, N);
         RfImageView target = view_of(frame, 5);

@@ -4,6 +4,7 @@
 
 #include "base.h"
 #include "data.h"
+#include "directional.h"
 #include "dual.h"
 #include "eulerian.h"
 #include "io.h"

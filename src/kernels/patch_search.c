@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sixteen places side by side are compared at once, one in each lane of a vector: a picture lies in planes, so that a
-// number of the query meets sixteen numbers in a row, whatever the mask looks like.
+// Places side by side are compared at once, one in each lane of some vectors: a picture lies in planes, so that a
+// number of the query meets as many numbers in a row, whatever the mask looks like. With several vectors at a time no
+// sum waits for itself.
 //
-//     query's numbers      q0    q1    q2 ...          in an order that jumps over the box
-//     lane = place         x .. x + 15
+//     query's numbers      q0    q1    q2 ...          channel by channel, in an order that jumps over the box
+//     lane = place         x .. x + 63
 //     partial sums         s[l] += weight (picture[x + l + offset] - q)^2
 //
-// Partial sums only grow. After each block of numbers sixteen places are given up as soon as the least of their sums is
-// above the best distance so far; and as the first numbers are from all over the box, most places are given up after
-// the first block or two. What is left is compared once more in plain order and in double, which decides.
+// Partial sums only grow. After each block of numbers the places are given up as soon as the least of their sums is
+// above the best distance so far; and as the first numbers are from all over the box and, where the caller sees to it,
+// from the channel that says most, most places are given up after some blocks. What is left is compared once more in
+// plain order and in double, which decides.
 #include "kernels/patch_search.h"
 #include "core/maths.h"
 #include "core/memory.h"
@@ -20,7 +22,8 @@
 
 enum
 {
-    LANES = RF_WIDE_FLOATS,
+    VECTORS = 4,
+    LANES = VECTORS * RF_WIDE_FLOATS,
     /// Numbers after which sums are looked at.
     BLOCK = 24
 };
@@ -29,9 +32,9 @@ enum
 static const float SLACK = 1.01f;
 
 RfResult rf_patch_picture_create(const float *pixels, int width, int height, int channels, const uint8_t *valid,
-                                 RfPatchPicture *out)
+                                 RfPatchRoom room, RfPatchPicture *out)
 {
-    *out = (RfPatchPicture){width, height, channels, NULL, rf_whole_vectors(width) + LANES, NULL};
+    *out = (RfPatchPicture){width, height, channels, NULL, rf_whole_vectors(width) + LANES, NULL, room};
     size_t plane = (size_t)height * (size_t)out->stride, row = (size_t)width + 1;
     out->planes = rf_allocate_zero(plane * (size_t)channels + LANES, sizeof *out->planes);
     out->invalid = rf_allocate_zero(row * ((size_t)height + 1), sizeof *out->invalid);
@@ -45,7 +48,7 @@ RfResult rf_patch_picture_create(const float *pixels, int width, int height, int
         {
             size_t pixel = y * (size_t)width + x;
             bool sound = !valid || valid[pixel];
-            for (size_t c = 0; c < (size_t)channels && sound; ++c)
+            for (size_t c = 0; c < (size_t)channels && (sound || room == RF_ROOM_OF_MIDDLE); ++c)
                 out->planes[c * plane + y * (size_t)out->stride + x] = pixels[pixel * (size_t)channels + c];
             int32_t *count = &out->invalid[(y + 1) * row + x + 1];
             *count = count[-1] + out->invalid[y * row + x + 1] - out->invalid[y * row + x] + !sound;
@@ -60,13 +63,32 @@ void rf_patch_picture_free(RfPatchPicture *picture)
     *picture = (RfPatchPicture){0};
 }
 
+// The pixels that must be valid for a box to have room, from the box's first one; and where their sums start.
+typedef struct Room
+{
+    int width;
+    const int32_t *top, *bottom;
+} Room;
+
+static Room room_at(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
+{
+    bool all = p->room == RF_ROOM_OF_ALL;
+    ptrdiff_t row = p->width + 1;
+    int width = all ? q->width : 1, height = all ? q->height : 1;
+    const int32_t *top = p->invalid + (all ? y * row + x : (y + q->height / 2) * row + x + q->width / 2);
+    return (Room){width, top, top + height * row};
+}
+
+static bool is_room(Room r, int lane)
+{
+    return r.bottom[lane + r.width] - r.bottom[lane] - r.top[lane + r.width] + r.top[lane] == 0;
+}
+
 static bool fits(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
 {
     if (x < 0 || y < 0 || x > p->width - q->width || y > p->height - q->height)
         return false;
-    ptrdiff_t row = p->width + 1;
-    const int32_t *top = p->invalid + y * row + x, *bottom = top + q->height * row;
-    return bottom[q->width] - bottom[0] - top[q->width] + top[0] == 0;
+    return is_room(room_at(p, q, x, y), 0);
 }
 
 static double distance_at(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
@@ -116,41 +138,57 @@ static int step_of(int count)
 static void set_terms(const RfPatchPicture *p, const RfPatchQuery *q, RfPatchTerms *terms)
 {
     terms->count = count_terms(p, q);
-    int step = step_of(terms->count), at = 0;
+    int known = terms->count / p->channels, step = step_of(known), at = 0;
     for (int i = 0; i < q->width * q->height; ++i)
-        for (int c = 0; c < p->channels && q->weights[i] > 0; ++c, at = (at + step) % terms->count)
-        {
-            terms->offset[at] = ((ptrdiff_t)c * p->height + i / q->width) * p->stride + i % q->width;
-            terms->value[at] = q->pixels[(ptrdiff_t)i * p->channels + c];
-            terms->weight[at] = q->weights[i];
-        }
-}
-
-RF_WIDE_BODY void rf_add_patch_terms_body(const float *first, const RfPatchTerms *terms, int from, int to, float *sums,
-                                          float *least)
-{
-    float own[LANES];
-    memcpy(own, sums, sizeof own);
-    for (int k = from; k < to; ++k)
     {
-        const float *there = first + terms->offset[k];
-        float value = terms->value[k], weight = terms->weight[k];
-        for (int l = 0; l < LANES; ++l)
+        if (!(q->weights[i] > 0))
+            continue;
+        for (int c = 0; c < p->channels; ++c)
         {
-            float d = there[l] - value;
-            own[l] += weight * d * d;
+            int term = c * known + at;
+            terms->offset[term] = ((ptrdiff_t)c * p->height + i / q->width) * p->stride + i % q->width;
+            terms->value[term] = q->pixels[(ptrdiff_t)i * p->channels + c];
+            terms->weight[term] = q->weights[i];
         }
+        at = (at + step) % known;
     }
-    float most = own[0];
-    for (int l = 1; l < LANES; ++l)
-        most = own[l] < most ? own[l] : most;
-    *least = most;
-    memcpy(sums, own, sizeof own);
 }
 
-RF_WIDE(rf_add_patch_terms,
-        (const float *first, const RfPatchTerms *terms, int from, int to, float *sums, float *least),
-        (first, terms, from, to, sums, least))
+// Unaligned where it is read through a pointer.
+typedef float Vector __attribute__((vector_size(RF_WIDE_FLOATS * sizeof(float)), aligned(4), may_alias));
+
+RF_WIDE_BODY void rf_sum_patch_terms_body(const float *first, const RfPatchTerms *terms, float limit, float *sums,
+                                          bool *whole)
+{
+    Vector own[VECTORS];
+    memcpy(own, sums, sizeof own);
+    *whole = false;
+    for (int k = 0; k < terms->count; k += BLOCK)
+    {
+        int to = k + BLOCK < terms->count ? k + BLOCK : terms->count;
+        for (int i = k; i < to; ++i)
+        {
+            const Vector *there = (const Vector *)(const void *)(first + terms->offset[i]);
+            float value = terms->value[i], weight = terms->weight[i];
+            for (int v = 0; v < VECTORS; ++v)
+            {
+                Vector d = there[v] - value;
+                own[v] += weight * d * d;
+            }
+        }
+        float now[LANES], least = INFINITY;
+        memcpy(now, own, sizeof now);
+        for (int l = 0; l < LANES; ++l)
+            least = now[l] < least ? now[l] : least;
+        if (least > limit)
+            return;
+    }
+    memcpy(sums, own, sizeof own);
+    *whole = true;
+}
+
+RF_WIDE(rf_sum_patch_terms, (const float *first, const RfPatchTerms *terms, float limit, float *sums, bool *whole),
+        (first, terms, limit, sums, whole))
 
 static void take(RfPatchMatch *best, int x, int y, double distance)
 {
@@ -159,29 +197,39 @@ static void take(RfPatchMatch *best, int x, int y, double distance)
         *best = (RfPatchMatch){x, y, distance};
 }
 
+// 0 where the box has room, else infinity. False: it has room nowhere.
+static bool start_sums(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y, float *sums)
+{
+    Room there = room_at(p, q, x, y);
+    int count = rf_min_int(LANES, p->width - q->width + 1 - x), room = 0;
+    for (int l = 0; l < LANES; ++l)
+        sums[l] = INFINITY;
+    for (int l = 0; l < count; ++l)
+    {
+        bool sound = is_room(there, l);
+        sums[l] = sound ? 0 : INFINITY;
+        room += sound;
+    }
+    return room > 0;
+}
+
 static void try_lanes(const RfPatchPicture *p, const RfPatchQuery *q, const RfPatchTerms *terms, int x, int y,
                       RfPatchMatch *best)
 {
-    float sums[LANES], least = INFINITY;
-    bool any = false;
-    for (int l = 0; l < LANES; ++l)
-    {
-        bool room = fits(p, q, x + l, y);
-        sums[l] = room ? 0 : INFINITY;
-        any |= room;
-    }
+    float sums[LANES];
     float limit = best->x < 0 ? INFINITY : (float)best->distance * SLACK;
-    if (!any)
+    if (!start_sums(p, q, x, y, sums))
         return;
-    for (int k = 0; k < terms->count; k += BLOCK)
-    {
-        rf_add_patch_terms(p->planes + y * p->stride + x, terms, k, rf_min_int(k + BLOCK, terms->count), sums, &least);
-        if (least > limit)
-            return;
-    }
+    bool whole;
+    rf_sum_patch_terms(p->planes + y * p->stride + x, terms, limit, sums, &whole);
+    if (!whole)
+        return;
     for (int l = 0; l < LANES; ++l)
-        if (sums[l] <= limit && fits(p, q, x + l, y))
+        if (sums[l] <= limit && sums[l] < INFINITY)
+        {
             take(best, x + l, y, distance_at(p, q, x + l, y));
+            limit = (float)best->distance * SLACK;
+        }
 }
 
 RfPatchMatch rf_patch_search(const RfPatchPicture *p, const RfPatchQuery *q, RfPatchTerms *terms)

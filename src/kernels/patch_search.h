@@ -17,6 +17,14 @@ enum
     RF_MAX_PATCH_TERMS = RF_PATCH_BOX * RF_PATCH_BOX * RF_MAX_EXEMPLAR_CHANNELS
 };
 
+/// Where a box has room: where all of its pixels are valid, or the one in its middle is (the other ones are then taken
+/// as they are).
+typedef enum RfPatchRoom
+{
+    RF_ROOM_OF_ALL,
+    RF_ROOM_OF_MIDDLE
+} RfPatchRoom;
+
 /// A picture that patches are taken from.
 typedef struct RfPatchPicture
 {
@@ -26,11 +34,13 @@ typedef struct RfPatchPicture
     ptrdiff_t stride;
     /// [height + 1][width + 1]: how many pixels above and left of here are not valid.
     int32_t *invalid;
+    RfPatchRoom room;
 } RfPatchPicture;
 
-/// pixels: [height][width][channels], finite where valid. valid: [height][width], 0: not valid; NULL: all are.
+/// pixels: [height][width][channels], finite where they are looked at. valid: [height][width], 0: not valid; NULL: all
+/// are.
 RfResult rf_patch_picture_create(const float *pixels, int width, int height, int channels, const uint8_t *valid,
-                                 RfPatchPicture *out);
+                                 RfPatchRoom room, RfPatchPicture *out);
 void rf_patch_picture_free(RfPatchPicture *picture);
 
 typedef struct RfPatchQuery
@@ -45,7 +55,7 @@ typedef struct RfPatchQuery
 
 typedef struct RfPatchMatch
 {
-    /// Of the box's first (top left) pixel. -1 where no box of valid pixels has room.
+    /// Of the box's first (top left) pixel. -1 where the box has room nowhere.
     int x, y;
     /// Sum of squared differences, each times its weight.
     double distance;
@@ -59,8 +69,8 @@ typedef struct RfPatchTerms
     float value[RF_MAX_PATCH_TERMS], weight[RF_MAX_PATCH_TERMS];
 } RfPatchTerms;
 
-/// From inside: adds the differences from some numbers of the query to the sums of sixteen places side by side, the
-/// first of which lies at `first`; *least: the least sum.
-void rf_add_patch_terms(const float *first, const RfPatchTerms *terms, int from, int to, float *sums, float *least);
+/// From inside: adds the differences from the query's numbers to the sums of places side by side, the first of which
+/// lies at `first`. whole: false if it was left because all sums were above the limit; they are then as they were.
+void rf_sum_patch_terms(const float *first, const RfPatchTerms *terms, float limit, float *sums, bool *whole);
 
 RfPatchMatch rf_patch_search(const RfPatchPicture *picture, const RfPatchQuery *query, RfPatchTerms *scratch);

@@ -228,6 +228,20 @@ static void sort_columns(const double *variances, int columns, int *order)
     }
 }
 
+void rf_principal_axes(double *covariance, int numbers, float *axes)
+{
+    assert(numbers >= 1 && numbers <= RF_BASIS_BLOCK);
+    double vectors[RF_BASIS_BLOCK * RF_BASIS_BLOCK], along[RF_BASIS_BLOCK];
+    int order[RF_BASIS_BLOCK];
+    diagonalise(covariance, vectors, numbers);
+    for (int i = 0; i < numbers; ++i)
+        along[i] = covariance[i * numbers + i];
+    sort_columns(along, numbers, order);
+    for (int i = 0; i < numbers; ++i)
+        for (int k = 0; k < numbers; ++k)
+            axes[i * numbers + k] = (float)vectors[k * numbers + order[i]];
+}
+
 // B = B V, strongest first.
 static void turn_basis(const Pass *pass, const Work *work, float *basis, double *variances, double *total)
 {

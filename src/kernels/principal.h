@@ -25,5 +25,9 @@ typedef struct RfPanelReader
 RfResult rf_principal_components(const RfPanelReader *reader, int blocks, float *basis, double *variances,
                                  double *total);
 
+/// The principal axes of few numbers, at most 32: rows of axes[numbers][numbers], orthonormal, strongest first.
+/// covariance[numbers][numbers]: symmetric; it is overwritten.
+void rf_principal_axes(double *covariance, int numbers, float *axes);
+
 /// Coordinates of a panel's 12 vectors: products[12][blocks * 32].
 void rf_project_panel(const float *panel, int numbers, const float *basis, int blocks, float *products);

@@ -3,7 +3,7 @@
 // fine.
 #pragma once
 
-#include "data/exemplar.h"
+#include "kernels/comparison.h"
 #include "kernels/synthesis.h"
 
 enum
@@ -13,24 +13,11 @@ enum
 
 typedef struct RfSynthesisMaterial
 {
-    const RfExemplar *exemplar;
-    /// Compared channels, the guides among them last.
-    int channels, guides;
-    /// Channel of the exemplar for each, what is subtracted and what it is multiplied by. Equal channels are compared
-    /// once, with their weights' sum.
-    int from[RF_MAX_EXEMPLAR_CHANNELS];
-    float middle[RF_MAX_EXEMPLAR_CHANNELS], factor[RF_MAX_EXEMPLAR_CHANNELS];
-    /// For each channel of the exemplar: 1 + the compared channel that equals it, 0 if there is none.
-    int compared[RF_MAX_EXEMPLAR_CHANNELS];
-    /// The widest range of a compared channel, in the unit of comparison.
-    float widest;
+    RfComparison comparison;
     int level_count;
     /// 0 is the finest.
     RfSynthesisExemplar levels[RF_SYNTHESIS_LEVELS];
 } RfSynthesisMaterial;
-
-/// The map of this name is compared with a guide, and not made.
-#define RF_GUIDE_MAP "guide"
 
 /// levels: 0 picks as many as leave 9 to 17 pixels on the shorter side, but 3 at least where there is room. Exemplar
 /// borrowed.

@@ -37,6 +37,7 @@
 
 VERBS(lagrangian, RfLagrangian)
 VERBS(optimize, RfOptimize)
+VERBS(directional, RfDirectional)
 VERBS(eulerian, RfEulerian)
 VERBS(dual, RfDual)
 VERBS(sprites, RfSprites)
@@ -67,6 +68,7 @@ static const Stepper g_steppers[] = {
     STEPPER("lagrangian", lagrangian_defaults, lagrangian, lagrangian_stats),
     STEPPER("paper", paper_defaults, lagrangian, lagrangian_stats),
     STEPPER("optimize", optimize_defaults, optimize, NULL),
+    STEPPER("directional", directional_defaults, directional, NULL),
     STEPPER("eulerian", eulerian_defaults, eulerian, NULL),
     STEPPER("dual", dual_defaults, dual, NULL),
     STEPPER("sprites", sprites_defaults, sprites, sprites_stats),

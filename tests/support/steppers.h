@@ -8,6 +8,7 @@ typedef union StepperOptions
 {
     RfLagrangianOptions lagrangian;
     RfOptimizeOptions optimize;
+    RfDirectionalOptions directional;
     RfEulerianOptions eulerian;
     RfDualOptions dual;
     RfSpritesOptions sprites;
@@ -30,8 +31,8 @@ typedef struct Stepper
     RfLagrangianStats (*stats)(const void *method);
 } Stepper;
 
-/// "lagrangian", "paper" (lagrangian with the paper's constants), "optimize", "eulerian", "dual", "sprites", "warp";
-/// NULL if there is none of the name.
+/// "lagrangian", "paper" (lagrangian with the paper's constants), "optimize", "directional", "eulerian", "dual",
+/// "sprites", "warp"; NULL if there is none of the name.
 const Stepper *stepper_find(const char *name);
 
 /// The field of `options` that an option stands for, and its kind; NULL if there is none of the name.

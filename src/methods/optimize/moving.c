@@ -43,9 +43,7 @@ RfResult rf_optimize_create(const RfExemplar *exemplar, const RfOptimizeOptions 
     RF_REQUIRE(exemplar && options && out, "rf_optimize_create: exemplar, options or out is NULL");
     *out = NULL;
     RF_TRY(rf_optimize_check(options));
-    if (rf_optimize_channels(exemplar) < rf_exemplar_channels(exemplar))
-        return rf_fail(RF_BAD_INPUT, NULL, NULL, "a map named %s belongs to still textures: leave it out",
-                       RF_GUIDE_MAP);
+    RF_TRY(rf_refuse_guide(exemplar));
     RfOptimize *o = rf_allocate_zero(1, sizeof *o);
     if (!o)
         return RF_OUT_OF_MEMORY;
@@ -330,9 +328,9 @@ RfOptimizeStats rf_optimize_stats(const RfOptimize *o)
     RfOptimizeStats stats = {0};
     if (!o || !o->placed)
         return stats;
-    double numbers = (double)o->side * o->side * o->material.channels;
+    double numbers = (double)o->side * o->side * o->material.comparison.channels;
     stats.patches = o->laid;
-    stats.energy = sqrt(o->distance / numbers) / (double)o->material.widest;
+    stats.energy = sqrt(o->distance / numbers) / (double)o->material.comparison.widest;
     stats.carry_seconds = o->seconds[0];
     stats.search_seconds = o->seconds[1];
     stats.draw_seconds = o->seconds[2];

@@ -185,7 +185,7 @@ static float error_at(const RfOptimize *o, const RfPatch *p, RfVec2 step)
     RfVec2 at = rf_vec2_add(p->at, step);
     RfVec2 laid = rf_vec2_add(p->source, rf_turn(p->turn, step));
     // A patch ends where the exemplar does; and what lies beyond the exemplar's border is to be laid over.
-    float widest = o->material.widest, beyond = widest * widest * (float)e->channels;
+    float widest = o->material.comparison.widest, beyond = widest * widest * (float)e->channels;
     if (!rf_optimize_inside(e, laid))
         return 16 * beyond;
     bool outside = at.x < -0.5f || at.y < -0.5f || at.x > (float)m->width - 0.5f || at.y > (float)m->height - 0.5f;

@@ -51,11 +51,11 @@ static bool sample_all(const RfExemplar *e, RfVec2 source, float *values)
 
 static void take_mean(const RfSynthesisMaterial *m, const int16_t *mean, float *values)
 {
-    for (int c = 0; c < m->exemplar->channels; ++c)
-        if (m->compared[c])
+    for (int c = 0; c < m->comparison.exemplar->channels; ++c)
+        if (m->comparison.compared[c])
         {
-            int k = m->compared[c] - 1;
-            values[c] = (float)mean[k] / (m->levels[0].scale * m->factor[k]) + m->middle[k];
+            int k = m->comparison.compared[c] - 1;
+            values[c] = (float)mean[k] / (m->levels[0].scale * m->comparison.factor[k]) + m->comparison.middle[k];
         }
 }
 
@@ -101,7 +101,7 @@ int rf_optimize_channels(const RfExemplar *exemplar)
 void rf_optimize_sample(const RfSynthesisMaterial *material, RfVec2 source, const RfVec2 *turn, const int16_t *mean,
                         float *values)
 {
-    const RfExemplar *e = material->exemplar;
+    const RfExemplar *e = material->comparison.exemplar;
     float all[RF_MAX_EXEMPLAR_CHANNELS];
     bool between = sample_all(e, source, all);
     if (mean)

@@ -101,7 +101,7 @@ static void read_target(const Still *s, Bounds *b, int x, int y)
 {
     const RfSynthesisMaterial *m = &s->material;
     const RfOptimizeConstraints *k = s->constraints;
-    int made = m->channels - m->guides;
+    int made = m->comparison.channels - m->comparison.guides;
     size_t pixel = (size_t)y * (size_t)b->width + (size_t)x;
     const float *from = NULL;
     if (k->target.pixels)
@@ -116,7 +116,8 @@ static void read_target(const Still *s, Bounds *b, int x, int y)
     }
     for (int c = 0; c < made && from; ++c)
         b->target[pixel * (size_t)made + (size_t)c] =
-            (from[made_channel(m->exemplar, m->from[c])] - m->middle[c]) * m->factor[c];
+            (from[made_channel(m->comparison.exemplar, m->comparison.from[c])] - m->comparison.middle[c]) *
+            m->comparison.factor[c];
 }
 
 static void read_guide(const Still *s, Bounds *b, int x, int y)
@@ -124,10 +125,11 @@ static void read_guide(const Still *s, Bounds *b, int x, int y)
     const RfSynthesisMaterial *m = &s->material;
     size_t pixel = (size_t)y * (size_t)b->width + (size_t)x;
     const float *from = view_pixel(&s->constraints->guide, x, y);
-    for (int c = 0; c < m->guides; ++c)
+    for (int c = 0; c < m->comparison.guides; ++c)
     {
-        int k = m->channels - m->guides + c;
-        b->guide[pixel * (size_t)m->guides + (size_t)c] = (from[c] - m->middle[k]) * m->factor[k];
+        int k = m->comparison.channels - m->comparison.guides + c;
+        b->guide[pixel * (size_t)m->comparison.guides + (size_t)c] =
+            (from[c] - m->comparison.middle[k]) * m->comparison.factor[k];
     }
 }
 
@@ -146,16 +148,17 @@ static RfResult read_bounds(Still *s, int width, int height)
     const RfOptimizeConstraints *k = s->constraints;
     Bounds *b = &s->bounds[0];
     size_t pixels = (size_t)width * (size_t)height;
-    bool target = k->target.pixels || k->fixed.pixels, guide = m->guides > 0;
+    bool target = k->target.pixels || k->fixed.pixels, guide = m->comparison.guides > 0;
     bool turns = k->orientation.pixels || k->scale.pixels;
     b->width = width;
     b->height = height;
     if (target)
-        b->target = rf_allocate_zero(pixels * (size_t)(m->channels - m->guides), sizeof *b->target);
+        b->target =
+            rf_allocate_zero(pixels * (size_t)(m->comparison.channels - m->comparison.guides), sizeof *b->target);
     if (target)
         b->hold = rf_allocate_zero(pixels, sizeof *b->hold);
     if (guide)
-        b->guide = rf_allocate(pixels * (size_t)m->guides, sizeof *b->guide);
+        b->guide = rf_allocate(pixels * (size_t)m->comparison.guides, sizeof *b->guide);
     if (turns)
         b->turns = rf_allocate(pixels, sizeof *b->turns);
     if ((target && (!b->target || !b->hold)) || (guide && !b->guide) || (turns && !b->turns))
@@ -222,7 +225,8 @@ static RfResult halve_bounds(Still *s, int level)
 {
     const Bounds *fine = &s->bounds[level - 1];
     Bounds *b = &s->bounds[level];
-    int channels = s->material.channels - s->material.guides, guides = s->material.guides;
+    int channels = s->material.comparison.channels - s->material.comparison.guides,
+        guides = s->material.comparison.guides;
     b->width = (fine->width + 1) / 2;
     b->height = (fine->height + 1) / 2;
     size_t pixels = (size_t)b->width * (size_t)b->height;
@@ -249,7 +253,8 @@ static RfResult fix_bounds(const Still *s, Bounds *b)
 {
     if (!b->target)
         return RF_OK;
-    RF_TRY(rf_fixed_create(b->width, b->height, s->material.channels - s->material.guides, 0, &b->held));
+    RF_TRY(rf_fixed_create(b->width, b->height, s->material.comparison.channels - s->material.comparison.guides, 0,
+                           &b->held));
     rf_fixed_set(&b->held, b->target, s->material.levels[0].scale);
     return RF_OK;
 }
@@ -267,7 +272,7 @@ static RfResult make_bounds(Still *s, int width, int height)
 static void show_guide(Still *s)
 {
     const Bounds *b = &s->bounds[s->level];
-    int guides = s->material.guides, made = s->material.channels - guides;
+    int guides = s->material.comparison.guides, made = s->material.comparison.channels - guides;
     const float limit = RF_FIXED_RANGE / 2;
     for (int y = 0; y < b->height && guides; ++y)
         for (int x = 0; x < b->width; ++x)
@@ -308,7 +313,7 @@ static RfResult open_windows(Still *s)
     s->variations = rf_allocate((size_t)rf_windows_count(s->windows), sizeof *s->variations);
     if (!s->variations)
         return RF_OUT_OF_MEMORY;
-    rf_windows_vary(s->windows, e->channels - s->material.guides, s->variations);
+    rf_windows_vary(s->windows, e->channels - s->material.comparison.guides, s->variations);
     return RF_OK;
 }
 
@@ -332,7 +337,7 @@ static RfResult search_step(Still *s, int round, bool all, RfSynthesisEnergy *en
         .windows = s->windows,
         .variations = s->variations,
         .prices = round > 0 && s->options->spread > 0 ? s->prices : NULL,
-        .guides = s->material.guides,
+        .guides = s->material.comparison.guides,
         .held = held_of(s),
         .plain = !is_turned(s),
         .all = all,
@@ -352,7 +357,7 @@ static RfResult assign_step(Still *s, bool robust, bool all)
         .robust = robust,
         .together = is_turned(s) ? TURNED_TOGETHER : 0,
         .all = all,
-        .guides = s->material.guides,
+        .guides = s->material.comparison.guides,
         .held = held_of(s),
     };
     return rf_synthesis_assign(&assign);
@@ -376,8 +381,8 @@ static double pixels_of(const Still *s, int level)
 static RfResult tell(Still *s, int iteration, int iterations, double energy)
 {
     char stage[96];
-    int numbers = s->side * s->side * s->material.channels;
-    double rms = sqrt(energy / numbers) / (s->material.levels[0].scale * s->material.widest);
+    int numbers = s->side * s->side * s->material.comparison.channels;
+    double rms = sqrt(energy / numbers) / (s->material.levels[0].scale * s->material.comparison.widest);
     snprintf(stage, sizeof stage, "level %d of %d, windows of %d, iteration %d of %d, energy %.4f",
              s->material.level_count - s->level, s->material.level_count, s->side, iteration + 1, iterations, rms);
     s->done += pixels_of(s, s->level);
@@ -417,7 +422,7 @@ static RfResult start_level(Still *s, bool start)
     const RfSynthesisMaterial *m = &s->material;
     const Bounds *b = &s->bounds[s->level];
     RfSynthesisFrame fine;
-    RF_TRY(rf_synthesis_frame_create(b->width, b->height, m->channels, s->options->tile, &fine));
+    RF_TRY(rf_synthesis_frame_create(b->width, b->height, m->comparison.channels, s->options->tile, &fine));
     if (!start)
         rf_synthesis_refine(&s->frame, b->turns, &fine);
     rf_synthesis_frame_free(&s->frame);
@@ -426,7 +431,7 @@ static RfResult start_level(Still *s, bool start)
     s->prices = rf_allocate((size_t)m->levels[s->level].width * (size_t)m->levels[s->level].height, sizeof *s->prices);
     if (!s->prices)
         return RF_OUT_OF_MEMORY;
-    rf_synthesis_show(&s->frame, &m->levels[s->level], m->guides, held_of(s));
+    rf_synthesis_show(&s->frame, &m->levels[s->level], m->comparison.guides, held_of(s));
     show_guide(s);
     rf_fixed_extend(&s->frame.picture, s->options->tile);
     return RF_OK;
