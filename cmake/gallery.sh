@@ -139,6 +139,39 @@ kept() {
     [ "$docs" != --docs ] || publish kept
 }
 
+# along NAME free|other FLOW EXEMPLAR [options] FLOW EXEMPLAR ...: a row a pair: exemplar, flow, frames 1, 30, 70,
+# 100 and 200 by --method directional (or what the pair's options say).
+along() {
+    local name=$1 licence=$2 folder=$out/$1 cells=() row=0 flow exemplar n reading width
+    shift 2
+    wanted "$name" || return 0
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    echo "$name"
+    while [ $# -gt 0 ]; do
+        flow=$1 exemplar=$2
+        shift 2
+        reading=(--method directional)
+        while [ $# -gt 0 ] && [[ $1 == --* ]]; do
+            reading+=("$1" "$2")
+            shift 2
+        done
+        present "$exemplar" "$name" || continue
+        row=$((row + 1))
+        "$riffle" texture "$flow" "$exemplar" "$folder/$row.%04d.png" "${reading[@]}" --frames 1-200 --progress none \
+            2>/dev/null
+        "$riffle" render "$flow" "$folder/$row.flow.%04d.png" --as lic --frames 1-1 --progress none
+        cells+=("$exemplar" "$folder/$row.flow.0001.png")
+        for n in 0001 0030 0070 0100 0200; do
+            cells+=("$folder/$row.$n.png")
+        done
+    done
+    [ $row = 0 ] || "$build/examples/contact_sheet" "$out/$name.png" --columns 7 --cell 320 "${cells[@]}"
+    if [ $row -gt 0 ] && [ "$docs" = --docs ] && [ "$licence" = free ]; then
+        publish "$name" 1920
+    fi
+}
+
 # labelled FROM TO LINE1 [LINE2]: the picture below two lines of text.
 labelled() {
     local font="font=Sans:fontcolor=0xe8e8e8:x=2:expansion=none" room="pad=iw:ih+56:0:56:color=0x1c1c1c"
@@ -188,6 +221,24 @@ sheet eddies-bubbles free "builtin:turbulence?size=256x256&speed=1" builtin:bubb
 clouds
 shapes
 kept
+
+# Directional texture: the scenes of the paper (parallel, round at one speed and at one angular speed, saddles and
+# centres), an unsteady one, one with an obstacle; exemplars; and where it fails, beside what it is to beat.
+along directional-scenes free \
+    "builtin:uniform?size=512x512&u=1.5&v=0.75" builtin:canes \
+    "builtin:rotation?size=512x512" builtin:canes --speed-min 2 --speed-max 2 \
+    "builtin:rotation?size=512x512&turn=0.5" builtin:canes \
+    "builtin:vortex?size=512x512" builtin:canes \
+    "builtin:gyre?size=512x512&epsilon=0" builtin:canes \
+    "builtin:gyre?size=512x512&period=100" builtin:canes \
+    "builtin:cylinder?size=256x256&speed=1" builtin:canes --size 512x512
+vortex="builtin:vortex?size=512x512"
+along directional-exemplars other \
+    "$vortex" "$exemplars/stk_grass3.jpg" "$vortex" "$exemplars/krita_11_drawed_furry.png" \
+    "$vortex" "$exemplars/stk_water_light.png" "$vortex" "$exemplars/ps_reptil_skin.pgm" \
+    "$vortex" "$exemplars/oa_lavahell2.png" "$vortex" "$exemplars/stk_oldWood.png"
+along directional-limits free \
+    "$vortex" builtin:canes --method warp "$vortex" builtin:pebbles "$vortex" "$exemplars/skimage_brick.png"
 
 # Real flows: wind (public domain, ISC), particle image velocimetry (BSD), a slice of turbulence (MIT).
 for flow in wind:gfs_wind piv:pivpy_day2 turbulence:example_data_HIT.nc; do
