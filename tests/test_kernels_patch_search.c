@@ -77,7 +77,7 @@ static void every_answer_is_that_of_a_plain_scan(void **state)
         int channels = 1 + (int)(seed % MOST_CHANNELS);
         draw(channels, seed, levels[seed % 3]);
         RfPatchPicture picture;
-        assert_int_equal(rf_patch_picture_create(g_picture, W, H, channels, g_valid, RF_ROOM_OF_ALL, &picture), RF_OK);
+        assert_int_equal(rf_patch_picture_create(g_picture, W, H, channels, g_valid, NULL, RF_ROOM_OF_ALL, &picture), RF_OK);
         RfPatchQuery query = {.width = 1 + (int)rf_random_below(40, seed, 6, 0, 0),
                               .height = 1 + (int)rf_random_below(40, seed, 6, 1, 0),
                               .pixels = g_box,
@@ -98,7 +98,7 @@ static void a_piece_of_the_picture_is_found(void **state)
     draw(3, 7, 1000);
     memset(g_valid, 1, sizeof g_valid);
     RfPatchPicture picture;
-    assert_int_equal(rf_patch_picture_create(g_picture, W, H, 3, NULL, RF_ROOM_OF_ALL, &picture), RF_OK);
+    assert_int_equal(rf_patch_picture_create(g_picture, W, H, 3, NULL, NULL, RF_ROOM_OF_ALL, &picture), RF_OK);
     for (int j = 0; j < 12; ++j)
         memcpy(g_box + (ptrdiff_t)j * 15 * 3, g_picture + ((ptrdiff_t)(20 + j) * W + 37) * 3, 15 * 3 * sizeof *g_box);
     RfPatchQuery query = {.width = 15, .height = 12, .pixels = g_box, .weights = g_weights};
@@ -113,7 +113,7 @@ static void where_nothing_has_room_nothing_is_found(void **state)
     draw(1, 1, 5);
     memset(g_valid, 0, sizeof g_valid);
     RfPatchPicture picture;
-    assert_int_equal(rf_patch_picture_create(g_picture, W, H, 1, g_valid, RF_ROOM_OF_ALL, &picture), RF_OK);
+    assert_int_equal(rf_patch_picture_create(g_picture, W, H, 1, g_valid, NULL, RF_ROOM_OF_ALL, &picture), RF_OK);
     RfPatchQuery query = {.width = 2, .height = 2, .pixels = g_box, .weights = g_weights};
     assert_int_equal(rf_patch_search(&picture, &query, &g_terms).x, -1);
     query.width = W + 1;
@@ -121,7 +121,7 @@ static void where_nothing_has_room_nothing_is_found(void **state)
     // A query that knows nothing fits anywhere: the first place.
     rf_patch_picture_free(&picture);
     memset(g_weights, 0, sizeof g_weights);
-    assert_int_equal(rf_patch_picture_create(g_picture, W, H, 1, NULL, RF_ROOM_OF_ALL, &picture), RF_OK);
+    assert_int_equal(rf_patch_picture_create(g_picture, W, H, 1, NULL, NULL, RF_ROOM_OF_ALL, &picture), RF_OK);
     query.width = 3;
     query.guess_x = 9;
     RfPatchMatch found = rf_patch_search(&picture, &query, &g_terms);

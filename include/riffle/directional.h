@@ -49,6 +49,10 @@ typedef struct RfDirectionalOptions
     /// Speeds are limited to these, in pixels a frame, 0 to 1000; 0: not. Slow texture is carried by whole pixels as
     /// soon as it has gone as far, so that `speed_min` is needed only where a standstill is unwanted. Default 0.
     float speed_min, speed_max;
+    /// How dear a patch is whose look (brightness and contrast of what is in its middle) is already shown more often
+    /// than the exemplar has it, 0 to 20; 0: patches are chosen by fit alone, as in the paper, and the plain ones crowd
+    /// out all others where much is replaced. Default 1.
+    float spread;
     /// How patches meet in the first frame. Default RF_SEAM_FEATHER.
     RfDirectionalSeam seam;
 } RfDirectionalOptions;

@@ -32,17 +32,20 @@ enum
 static const float SLACK = 1.01f;
 
 RfResult rf_patch_picture_create(const float *pixels, int width, int height, int channels, const uint8_t *valid,
-                                 RfPatchRoom room, RfPatchPicture *out)
+                                 const uint8_t *groups, RfPatchRoom room, RfPatchPicture *out)
 {
-    *out = (RfPatchPicture){width, height, channels, NULL, rf_whole_vectors(width) + LANES, NULL, room};
+    *out = (RfPatchPicture){width, height, channels, NULL, rf_whole_vectors(width) + LANES, NULL, room, NULL};
     size_t plane = (size_t)height * (size_t)out->stride, row = (size_t)width + 1;
     out->planes = rf_allocate_zero(plane * (size_t)channels + LANES, sizeof *out->planes);
     out->invalid = rf_allocate_zero(row * ((size_t)height + 1), sizeof *out->invalid);
-    if (!out->planes || !out->invalid)
+    out->groups = rf_allocate_zero((size_t)width * (size_t)height, 1);
+    if (!out->planes || !out->invalid || !out->groups)
     {
         rf_patch_picture_free(out);
         return RF_OUT_OF_MEMORY;
     }
+    if (groups)
+        memcpy(out->groups, groups, (size_t)width * (size_t)height);
     for (size_t y = 0; y < (size_t)height; ++y)
         for (size_t x = 0; x < (size_t)width; ++x)
         {
@@ -60,6 +63,7 @@ void rf_patch_picture_free(RfPatchPicture *picture)
 {
     rf_release(picture->planes);
     rf_release(picture->invalid);
+    rf_release(picture->groups);
     *picture = (RfPatchPicture){0};
 }
 
@@ -91,9 +95,14 @@ static bool fits(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
     return is_room(room_at(p, q, x, y), 0);
 }
 
+static float price_at(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
+{
+    return q->prices ? q->prices[p->groups[(ptrdiff_t)(y + q->height / 2) * p->width + x + q->width / 2]] : 0;
+}
+
 static double distance_at(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
 {
-    double sum = 0;
+    double sum = (double)price_at(p, q, x, y);
     for (int j = 0; j < q->height; ++j)
         for (int i = 0; i < q->width; ++i)
         {
@@ -197,7 +206,7 @@ static void take(RfPatchMatch *best, int x, int y, double distance)
         *best = (RfPatchMatch){x, y, distance};
 }
 
-// 0 where the box has room, else infinity. False: it has room nowhere.
+// The price where the box has room, else infinity. False: it has room nowhere.
 static bool start_sums(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y, float *sums)
 {
     Room there = room_at(p, q, x, y);
@@ -207,7 +216,7 @@ static bool start_sums(const RfPatchPicture *p, const RfPatchQuery *q, int x, in
     for (int l = 0; l < count; ++l)
     {
         bool sound = is_room(there, l);
-        sums[l] = sound ? 0 : INFINITY;
+        sums[l] = sound ? price_at(p, q, x + l, y) : INFINITY;
         room += sound;
     }
     return room > 0;

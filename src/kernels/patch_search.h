@@ -35,12 +35,14 @@ typedef struct RfPatchPicture
     /// [height + 1][width + 1]: how many pixels above and left of here are not valid.
     int32_t *invalid;
     RfPatchRoom room;
+    /// [height][width]: the group of each pixel, which is priced.
+    uint8_t *groups;
 } RfPatchPicture;
 
 /// pixels: [height][width][channels], finite where they are looked at. valid: [height][width], 0: not valid; NULL: all
-/// are.
+/// are. groups: [height][width]; NULL: all 0.
 RfResult rf_patch_picture_create(const float *pixels, int width, int height, int channels, const uint8_t *valid,
-                                 RfPatchRoom room, RfPatchPicture *out);
+                                 const uint8_t *groups, RfPatchRoom room, RfPatchPicture *out);
 void rf_patch_picture_free(RfPatchPicture *picture);
 
 typedef struct RfPatchQuery
@@ -49,6 +51,8 @@ typedef struct RfPatchQuery
     int width, height;
     /// [height][width][channels] and [height][width]: what is known, and how much it counts, 0: not known.
     const float *pixels, *weights;
+    /// What a place costs besides, by the group of the pixel in the box's middle; 0 or more. NULL: nothing.
+    const float *prices;
     /// A place that may fit well, from which the search starts. Any numbers: it changes the time, never the result.
     int guess_x, guess_y;
 } RfPatchQuery;
@@ -57,7 +61,7 @@ typedef struct RfPatchMatch
 {
     /// Of the box's first (top left) pixel. -1 where the box has room nowhere.
     int x, y;
-    /// Sum of squared differences, each times its weight.
+    /// Sum of squared differences, each times its weight, and the price.
     double distance;
 } RfPatchMatch;
 

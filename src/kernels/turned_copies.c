@@ -11,7 +11,9 @@
 enum
 {
     // Exemplars with longer sides are searched on a coarser level.
-    SEARCHED_SIDE = 256
+    SEARCHED_SIDE = 256,
+    // Of the square by which a pixel's look is told: about that of a patch.
+    LOOK_RADIUS = 4
 };
 
 typedef struct Turning
@@ -19,7 +21,7 @@ typedef struct Turning
     RfTurnedCopies *copies;
     /// Of one worker each: room for the largest copy.
     float *pixels;
-    uint8_t *valid;
+    uint8_t *valid, *groups;
     size_t room;
     RfResult result;
 } Turning;
@@ -107,7 +109,37 @@ static void find_axes(RfTurnedCopies *copies)
     for (int a = 0; a < n; ++a)
         for (int b = 0; b < n; ++b)
             products[a * n + b] -= sums[a] * sums[b] / (double)pixels;
+    for (int a = 0; a < n; ++a)
+        copies->variance += (float)(products[a * n + a] / (double)pixels);
     rf_principal_axes(products, n, copies->axes);
+}
+
+// By the first principal axis.
+static RfResult find_looks(RfTurnedCopies *copies)
+{
+    const RfExemplar *e = copies->comparison->exemplar;
+    size_t pixels = (size_t)e->width * (size_t)e->height;
+    float *values = rf_allocate(pixels, sizeof *values);
+    copies->looks = rf_allocate(pixels, 1);
+    RfResult result = values && copies->looks ? RF_OK : RF_OUT_OF_MEMORY;
+    for (size_t i = 0; i < pixels && result == RF_OK; ++i)
+    {
+        float compared[RF_MAX_EXEMPLAR_CHANNELS];
+        rf_turned_copies_compared(copies, e->pixels + i * (size_t)e->channels, compared);
+        values[i] = compared[0];
+    }
+    if (result == RF_OK)
+        result = rf_looks_find(values, e->width, e->height, e->tiles, LOOK_RADIUS, copies->looks);
+    rf_release(values);
+    return result;
+}
+
+int rf_turned_copies_look(const RfTurnedCopies *copies, RfVec2 source)
+{
+    const RfExemplar *e = copies->comparison->exemplar;
+    int x = rf_border_int(rf_nearest_int(source.x - 0.5f), e->width, e->tiles);
+    int y = rf_border_int(rf_nearest_int(source.y - 0.5f), e->height, e->tiles);
+    return copies->looks[(ptrdiff_t)y * e->width + x];
 }
 
 static bool is_valid(const RfTurnedCopies *copies, RfVec2 source)
@@ -125,7 +157,7 @@ static void make_copy(void *context, int copy, int worker)
     RfPatchPicture *p = &copies->pictures[copy];
     int width = p->width, height = p->height, channels = copies->comparison->channels;
     float *pixels = t->pixels + (size_t)worker * t->room * (size_t)channels;
-    uint8_t *valid = t->valid + (size_t)worker * t->room;
+    uint8_t *valid = t->valid + (size_t)worker * t->room, *groups = t->groups + (size_t)worker * t->room;
     RfJacobian j = rf_turned_copy_jacobian(copies, copy);
     float size = (float)copies->size;
     RfJacobian wide = {j.xx * size, j.xy * size, j.yx * size, j.yy * size};
@@ -137,13 +169,14 @@ static void make_copy(void *context, int copy, int worker)
             RfVec2 source = source_of(copies, copy, j, (RfVec2){(float)x, (float)y});
             size_t pixel = (size_t)y * (size_t)width + (size_t)x;
             valid[pixel] = is_valid(copies, source);
+            groups[pixel] = (uint8_t)rf_turned_copies_look(copies, source);
             if (!valid[pixel] && !tiles)
                 continue;
             rf_sampler_at(copies->sampler, source, wide, values);
             rf_turned_copies_compared(copies, values, pixels + pixel * (size_t)channels);
         }
     RfPatchRoom room = tiles ? RF_ROOM_OF_MIDDLE : RF_ROOM_OF_ALL;
-    if (rf_patch_picture_create(pixels, width, height, channels, valid, room, p) != RF_OK)
+    if (rf_patch_picture_create(pixels, width, height, channels, valid, groups, room, p) != RF_OK)
         t->result = RF_OUT_OF_MEMORY;
 }
 
@@ -177,16 +210,18 @@ static RfResult make_copies(RfTurnedCopies *copies, int box)
     copies->pictures = rf_allocate_zero((size_t)copies->count, sizeof *copies->pictures);
     if (!copies->pictures)
         return RF_OUT_OF_MEMORY;
-    Turning turning = {copies, NULL, NULL, set_sizes(copies, box), RF_OK};
+    Turning turning = {copies, NULL, NULL, NULL, set_sizes(copies, box), RF_OK};
     size_t pixels = (size_t)rf_threads() * turning.room;
     turning.pixels = rf_allocate(pixels * (size_t)copies->comparison->channels, sizeof *turning.pixels);
     turning.valid = rf_allocate(pixels, 1);
-    if (turning.pixels && turning.valid)
+    turning.groups = rf_allocate(pixels, 1);
+    if (turning.pixels && turning.valid && turning.groups)
         rf_parallel_for(copies->count, make_copy, &turning);
     else
         turning.result = RF_OUT_OF_MEMORY;
     rf_release(turning.pixels);
     rf_release(turning.valid);
+    rf_release(turning.groups);
     return turning.result;
 }
 
@@ -199,7 +234,9 @@ RfResult rf_turned_copies_create(const RfSampler *sampler, const RfComparison *c
     while (rf_max_int(e->width, e->height) / out->size > SEARCHED_SIDE)
         out->size *= 2;
     find_axes(out);
-    RfResult result = make_copies(out, box);
+    RfResult result = find_looks(out);
+    if (result == RF_OK)
+        result = make_copies(out, box);
     if (result != RF_OK)
         rf_turned_copies_free(out);
     return result;
@@ -210,5 +247,6 @@ void rf_turned_copies_free(RfTurnedCopies *copies)
     for (int k = 0; k < copies->count && copies->pictures; ++k)
         rf_patch_picture_free(&copies->pictures[k]);
     rf_release(copies->pictures);
+    rf_release(copies->looks);
     *copies = (RfTurnedCopies){0};
 }

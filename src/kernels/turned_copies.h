@@ -8,6 +8,7 @@
 #pragma once
 
 #include "kernels/comparison.h"
+#include "kernels/looks.h"
 #include "kernels/patch_search.h"
 #include "kernels/sampler.h"
 
@@ -21,12 +22,18 @@ typedef struct RfTurnedCopies
     const RfComparison *comparison;
     /// [comparison->channels][comparison->channels]: orthonormal, strongest first.
     float axes[RF_MAX_EXEMPLAR_CHANNELS * RF_MAX_EXEMPLAR_CHANNELS];
+    /// [height][width] of the exemplar.
+    uint8_t *looks;
+    /// The sum of the compared channels' variances.
+    float variance;
     RfPatchPicture *pictures;
 } RfTurnedCopies;
 
 /// box: the longest side of a query, in pixels of the exemplar.
 RfResult rf_turned_copies_create(const RfSampler *sampler, const RfComparison *comparison, float direction, int count,
                                  int box, RfTurnedCopies *out);
+/// What the exemplar looks like round a place (kernels/looks.h).
+int rf_turned_copies_look(const RfTurnedCopies *copies, RfVec2 source);
 void rf_turned_copies_free(RfTurnedCopies *copies);
 
 /// What is compared of a pixel with all channels of the exemplar: values[comparison->channels].

@@ -49,6 +49,7 @@ static void free_frame(RfDirectional *d)
     rf_release(d->second);
     rf_release(d->stack);
     rf_release(d->loose);
+    rf_release(d->prices);
     rf_release(d->cells.cells);
     rf_release(d->holes.cells);
     rf_release(d->moves);
@@ -153,10 +154,13 @@ RfResult rf_directional_make_room(RfDirectional *d, int width, int height)
     d->second = rf_allocate(pixels, sizeof *d->second);
     d->stack = rf_allocate(pixels, sizeof *d->stack);
     d->loose = rf_allocate(pixels, 1);
+    d->region_columns = (width + RF_DIRECTIONAL_REGION - 1) / RF_DIRECTIONAL_REGION;
+    d->region_rows = (height + RF_DIRECTIONAL_REGION - 1) / RF_DIRECTIONAL_REGION;
+    d->prices = rf_allocate_zero((size_t)d->region_columns * (size_t)d->region_rows, sizeof *d->prices);
     d->scratch = rf_allocate((size_t)rf_threads(), sizeof *d->scratch);
     bool enough = d->texels && d->next_texels && d->picture && d->next_picture && d->blended && d->next_blended &&
                   d->velocity && d->direction_at && d->inside && d->first && d->second && d->stack && d->loose &&
-                  d->scratch;
+                  d->prices && d->scratch;
     if (!enough)
         return RF_OUT_OF_MEMORY;
     RF_TRY(rf_progress("turning the exemplar", 0));

@@ -32,6 +32,12 @@ typedef struct RfCell
     int x, y, width, height;
 } RfCell;
 
+enum
+{
+    /// Side of the regions in which it is counted what is shown.
+    RF_DIRECTIONAL_REGION = 128
+};
+
 /// A cell of the frame before, and how it moves.
 typedef struct RfMove
 {
@@ -57,6 +63,7 @@ typedef struct RfPatchScratch
     /// Pixels from the hole, squared.
     int distance[RF_PATCH_BOX * RF_PATCH_BOX];
     RfPatchTerms terms;
+    float prices[RF_LOOKS];
     RfRing ring;
 } RfPatchScratch;
 
@@ -93,6 +100,10 @@ struct RfDirectional
     RfMove *moves;
     int move_room;
     RfPatchScratch *scratch;
+    /// Of each look in each region of the frame: what a patch of it costs, in parts of the exemplar's variance for each
+    /// pixel that the patch is compared at.
+    float (*prices)[RF_LOOKS];
+    int region_columns, region_rows;
     /// Pixels counted in the last step.
     int64_t fluid, filled, continued, renewed;
     /// Patches laid since the first frame, for drawing at random where nothing is known.

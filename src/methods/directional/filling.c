@@ -30,6 +30,12 @@ typedef enum LayingKind
     LAY_OVER
 } LayingKind;
 
+// Of the exemplar's variance: what a patch costs whose look is shown as often as the exemplar has it. In turbulence the
+// frame keeps TODO.
+static const float PRICE = 0.2f;
+// What is shown more often than this costs no more.
+static const float MOST_SHARE = 4;
+
 /// What is being laid.
 typedef struct Laying
 {
@@ -165,6 +171,19 @@ static RfVec2 refine(const RfDirectional *d, RfCell box, const RfPatchScratch *s
     return best;
 }
 
+static void set_prices(const RfDirectional *d, RfCell box, RfPatchQuery *query, float *prices)
+{
+    int column = (box.x + box.width / 2) / RF_DIRECTIONAL_REGION,
+        row = (box.y + box.height / 2) / RF_DIRECTIONAL_REGION;
+    const float *shares = d->prices[row * d->region_columns + column];
+    float known = 0;
+    for (int i = 0; i < query->width * query->height; ++i)
+        known += query->weights[i];
+    for (int k = 0; k < RF_LOOKS; ++k)
+        prices[k] = shares[k] * known * d->copies.variance;
+    query->prices = prices;
+}
+
 // Exemplar coordinates of the box's first pixel.
 static RfVec2 best_fit(const RfDirectional *d, RfCell box, int copy, uint64_t item, RfPatchScratch *s)
 {
@@ -176,6 +195,7 @@ static RfVec2 best_fit(const RfDirectional *d, RfCell box, int copy, uint64_t it
     if (!anything)
         return draw_place(d, copy, box, item);
     guess(d, box, copy, s, &query);
+    set_prices(d, box, &query, s->prices);
     RfPatchMatch match = rf_patch_search(&d->copies.pictures[copy], &query, &s->terms);
     if (match.x < 0)
         return draw_place(d, copy, box, item);
@@ -305,6 +325,26 @@ static RfResult make_waves(const RfDirectional *d, const RfCellList *list, Waves
     return RF_OK;
 }
 
+// What is shown more often than the exemplar has it costs more.
+static void set_region_prices(void *context, int region, int worker)
+{
+    (void)worker;
+    RfDirectional *d = context;
+    int64_t count[RF_LOOKS] = {0};
+    int x0 = region % d->region_columns * RF_DIRECTIONAL_REGION, x1 = rf_min_int(x0 + RF_DIRECTIONAL_REGION, d->width);
+    int y0 = region / d->region_columns * RF_DIRECTIONAL_REGION, y1 = rf_min_int(y0 + RF_DIRECTIONAL_REGION, d->height);
+    for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x)
+        {
+            const RfTexel *texel = &d->texels[y * d->width + x];
+            if (texel->copy >= 0)
+                ++count[rf_turned_copies_look(&d->copies, texel->source)];
+        }
+    rf_looks_shares(count, MOST_SHARE, d->prices[region]);
+    for (int k = 0; k < RF_LOOKS; ++k)
+        d->prices[region][k] *= d->options.spread * PRICE;
+}
+
 static RfResult lay_all(RfDirectional *d, const RfCellList *list, LayingKind kind, const char *stage)
 {
     if (list->count == 0)
@@ -371,6 +411,7 @@ RfResult rf_directional_fill(RfDirectional *d)
     uint8_t *seen = rf_allocate_zero(pixels, 1);
     RfResult result = seen ? RF_OK : RF_OUT_OF_MEMORY;
     d->holes.count = 0;
+    rf_parallel_for(d->region_rows * d->region_columns, set_region_prices, d);
     for (int i = 0; i < (int)pixels && result == RF_OK; ++i)
     {
         d->filled += rf_directional_missing(d, i);

@@ -30,6 +30,10 @@ static const RfOption g_options[] = {
     {"speed-max", RF_OPTION_FLOAT, offsetof(RfDirectionalOptions, speed_max), "px/frame", 0, 1000, 0, NULL,
      "What moves faster moves as slowly as this; 0: no limit. Texture that moves by more than half a shape a frame "
      "seems to go backwards."},
+    {"spread", RF_OPTION_FLOAT, offsetof(RfDirectionalOptions, spread), "", 0, 20, 1, NULL,
+     "How dear patches are of a look that is shown too often already; 0: they are chosen by fit alone, as in the "
+     "paper, "
+     "and plain ones crowd out the others."},
     {"seam", RF_OPTION_CHOICE, offsetof(RfDirectionalOptions, seam), "", 0, 1, RF_SEAM_FEATHER, "feather|cut",
      "How patches meet in the first frame: they fade into each other, or are cut where they differ least."},
 };
@@ -56,7 +60,8 @@ RfDirectionalOptions rf_directional_defaults(void)
                                   .cell_max = 32,
                                   .velocity_spread = 0.5f,
                                   .mask_width = 4,
-                                  .renew_after = 2};
+                                  .renew_after = 2,
+                                  .spread = 1};
 }
 
 RfResult rf_directional_check(const RfDirectionalOptions *options)
