@@ -36,10 +36,17 @@ int rf_turned_copy_of(const RfTurnedCopies *copies, float direction)
     return rf_wrap_int(rf_nearest_int(direction * (float)copies->count / (2 * RF_PI)), copies->count);
 }
 
-RfJacobian rf_turned_copy_jacobian(const RfTurnedCopies *copies, int copy)
+static RfResult find_jacobians(RfTurnedCopies *copies)
 {
-    float angle = rf_turned_copy_direction(copies, copy) - copies->direction;
-    return (RfJacobian){cosf(angle), sinf(angle), -sinf(angle), cosf(angle)};
+    copies->jacobians = rf_allocate((size_t)copies->count, sizeof *copies->jacobians);
+    if (!copies->jacobians)
+        return RF_OUT_OF_MEMORY;
+    for (int k = 0; k < copies->count; ++k)
+    {
+        float angle = rf_turned_copy_direction(copies, k) - copies->direction;
+        copies->jacobians[k] = (RfJacobian){cosf(angle), sinf(angle), -sinf(angle), cosf(angle)};
+    }
+    return RF_OK;
 }
 
 static RfVec2 middle_of(const RfTurnedCopies *copies, int copy)
@@ -234,7 +241,9 @@ RfResult rf_turned_copies_create(const RfSampler *sampler, const RfComparison *c
     while (rf_max_int(e->width, e->height) / out->size > SEARCHED_SIDE)
         out->size *= 2;
     find_axes(out);
-    RfResult result = find_looks(out);
+    RfResult result = find_jacobians(out);
+    if (result == RF_OK)
+        result = find_looks(out);
     if (result == RF_OK)
         result = make_copies(out, box);
     if (result != RF_OK)
@@ -248,5 +257,6 @@ void rf_turned_copies_free(RfTurnedCopies *copies)
         rf_patch_picture_free(&copies->pictures[k]);
     rf_release(copies->pictures);
     rf_release(copies->looks);
+    rf_release(copies->jacobians);
     *copies = (RfTurnedCopies){0};
 }

@@ -26,6 +26,8 @@ typedef struct RfTurnedCopies
     uint8_t *looks;
     /// The sum of the compared channels' variances.
     float variance;
+    /// Of each copy.
+    RfJacobian *jacobians;
     RfPatchPicture *pictures;
 } RfTurnedCopies;
 
@@ -43,7 +45,10 @@ int rf_turned_copy_of(const RfTurnedCopies *copies, float direction);
 /// Where the main direction of a copy points to, radians.
 float rf_turned_copy_direction(const RfTurnedCopies *copies, int copy);
 /// How the exemplar's coordinates change from pixel to pixel of the frame where it lies as the copy does.
-RfJacobian rf_turned_copy_jacobian(const RfTurnedCopies *copies, int copy);
+static inline RfJacobian rf_turned_copy_jacobian(const RfTurnedCopies *copies, int copy)
+{
+    return copies->jacobians[copy];
+}
 static inline RfVec2 rf_jacobian_step(RfJacobian j, RfVec2 step)
 {
     return (RfVec2){j.xx * step.x + j.xy * step.y, j.yx * step.x + j.yy * step.y};

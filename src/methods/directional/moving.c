@@ -257,37 +257,58 @@ static void continue_row(void *context, int y, int worker)
 
 static bool together(const RfDirectional *d, int a, int b)
 {
-    return d->moves[a].dx == d->moves[b].dx && d->moves[a].dy == d->moves[b].dy;
+    return a == b || (d->moves[a].dx == d->moves[b].dx && d->moves[a].dy == d->moves[b].dy);
+}
+
+typedef struct Around
+{
+    int pixels[8], dx[8], dy[8], count;
+} Around;
+
+static Around around(const RfDirectional *d, int x, int y)
+{
+    Around a = {.count = 0};
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+        {
+            if ((dx == 0 && dy == 0) || x + dx < 0 || y + dy < 0 || x + dx >= d->width || y + dy >= d->height)
+                continue;
+            a.pixels[a.count] = (y + dy) * d->width + x + dx;
+            a.dx[a.count] = dx;
+            a.dy[a.count++] = dy;
+        }
+    return a;
 }
 
 // A piece that many cells have carried frays: where neighbours part, pixels that few of them continue are taken for
 // cracks.
+static bool is_loose(const RfDirectional *d, int pixel, int x, int y)
+{
+    const RfTexel *texel = &d->next_texels[pixel];
+    if (texel->copy < 0)
+        return false;
+    Around a = around(d, x, y);
+    bool parting = false;
+    for (int i = 0; i < a.count && !parting; ++i)
+        parting = d->next_texels[a.pixels[i]].copy >= 0 && !together(d, d->first[pixel], d->first[a.pixels[i]]);
+    if (!parting)
+        return false;
+    int held = 0;
+    for (int i = 0; i < a.count; ++i)
+    {
+        RfVec2 step = {(float)a.dx[i], (float)a.dy[i]};
+        RfVec2 source = rf_jacobian_step(rf_turned_copy_jacobian(&d->copies, texel->copy), step);
+        held += continues(&d->next_texels[a.pixels[i]], texel->copy, rf_vec2_add(texel->source, source));
+    }
+    return 8 * held < HELD_BY * a.count;
+}
+
 static void find_loose_row(void *context, int y, int worker)
 {
     (void)worker;
     RfDirectional *d = context;
     for (int x = 0; x < d->width; ++x)
-    {
-        int pixel = y * d->width + x, around = 0, held = 0;
-        bool parting = false;
-        const RfTexel *texel = &d->next_texels[pixel];
-        d->loose[pixel] = 0;
-        if (texel->copy < 0)
-            continue;
-        RfJacobian j = rf_turned_copy_jacobian(&d->copies, texel->copy);
-        for (int dy = -1; dy <= 1; ++dy)
-            for (int dx = -1; dx <= 1; ++dx)
-            {
-                if ((dx == 0 && dy == 0) || x + dx < 0 || y + dy < 0 || x + dx >= d->width || y + dy >= d->height)
-                    continue;
-                RfVec2 step = {(float)dx, (float)dy};
-                const RfTexel *other = &d->next_texels[pixel + dy * d->width + dx];
-                ++around;
-                parting |= other->copy >= 0 && !together(d, d->first[pixel], d->first[pixel + dy * d->width + dx]);
-                held += continues(other, texel->copy, rf_vec2_add(texel->source, rf_jacobian_step(j, step)));
-            }
-        d->loose[pixel] = parting && 8 * held < HELD_BY * around;
-    }
+        d->loose[y * d->width + x] = is_loose(d, y * d->width + x, x, y);
 }
 
 static void leave_out_loose(RfDirectional *d)
