@@ -20,11 +20,14 @@ enum
 
 static float g_picture[W * H * MOST_CHANNELS], g_box[RF_PATCH_BOX * RF_PATCH_BOX * MOST_CHANNELS];
 static float g_weights[RF_PATCH_BOX * RF_PATCH_BOX];
-static uint8_t g_valid[W * H];
+static uint8_t g_valid[W * H], g_groups[W * H];
+static float g_prices[256];
 static RfPatchTerms g_terms;
 
-static bool is_valid(const RfPatchQuery *q, int x, int y)
+static bool has_room(const RfPatchQuery *q, RfPatchRoom room, int x, int y)
 {
+    if (room == RF_ROOM_OF_MIDDLE)
+        return g_valid[(y + q->height / 2) * W + x + q->width / 2];
     for (int j = 0; j < q->height; ++j)
         for (int i = 0; i < q->width; ++i)
             if (!g_valid[(y + j) * W + x + i])
@@ -32,13 +35,13 @@ static bool is_valid(const RfPatchQuery *q, int x, int y)
     return true;
 }
 
-static RfPatchMatch plain_scan(const RfPatchQuery *q, int channels)
+static RfPatchMatch plain_scan(const RfPatchQuery *q, int channels, RfPatchRoom room)
 {
     RfPatchMatch best = {-1, -1, INFINITY};
     for (int y = 0; y <= H - q->height; ++y)
         for (int x = 0; x <= W - q->width; ++x)
         {
-            double sum = 0;
+            double sum = q->prices ? (double)g_prices[g_groups[(y + q->height / 2) * W + x + q->width / 2]] : 0;
             for (int j = 0; j < q->height; ++j)
                 for (int i = 0; i < q->width; ++i)
                     for (int c = 0; c < channels; ++c)
@@ -48,7 +51,7 @@ static RfPatchMatch plain_scan(const RfPatchQuery *q, int channels)
                                    (double)q->pixels[k * channels + c];
                         sum += (double)q->weights[k] * d * d;
                     }
-            if (is_valid(q, x, y) && (best.x < 0 || sum < best.distance))
+            if (has_room(q, room, x, y) && (best.x < 0 || sum < best.distance))
                 best = (RfPatchMatch){x, y, sum};
         }
     return best;
@@ -63,6 +66,10 @@ static void draw(int channels, uint64_t seed, int levels)
         g_box[i] = floorf(rf_random_float(seed, 2, (uint64_t)i, 0) * (float)levels) / (float)levels;
     for (int i = 0; i < RF_PATCH_BOX * RF_PATCH_BOX; ++i)
         g_weights[i] = rf_random_below(3, seed, 3, (uint64_t)i, 0) ? 0 : rf_random_float(seed, 4, (uint64_t)i, 0);
+    for (int i = 0; i < W * H; ++i)
+        g_groups[i] = (uint8_t)rf_random_below(256, seed, 7, (uint64_t)i, 0);
+    for (int i = 0; i < 256; ++i)
+        g_prices[i] = floorf(4 * rf_random_float(seed, 8, (uint64_t)i, 0));
     memset(g_valid, 1, sizeof g_valid);
     for (int k = 0; k < 6; ++k)
         g_valid[rf_random_below(W * H, seed, 5, (uint64_t)k, 0)] = k == 0 || seed % 2;
@@ -76,15 +83,17 @@ static void every_answer_is_that_of_a_plain_scan(void **state)
     {
         int channels = 1 + (int)(seed % MOST_CHANNELS);
         draw(channels, seed, levels[seed % 3]);
+        RfPatchRoom room = seed / 2 % 2 ? RF_ROOM_OF_MIDDLE : RF_ROOM_OF_ALL;
         RfPatchPicture picture;
-        assert_int_equal(rf_patch_picture_create(g_picture, W, H, channels, g_valid, NULL, RF_ROOM_OF_ALL, &picture), RF_OK);
+        assert_int_equal(rf_patch_picture_create(g_picture, W, H, channels, g_valid, g_groups, room, &picture), RF_OK);
         RfPatchQuery query = {.width = 1 + (int)rf_random_below(40, seed, 6, 0, 0),
                               .height = 1 + (int)rf_random_below(40, seed, 6, 1, 0),
                               .pixels = g_box,
                               .weights = g_weights,
+                              .prices = seed / 4 % 2 ? g_prices : NULL,
                               .guess_x = (int)rf_random_below(80, seed, 6, 2, 0) - 20,
                               .guess_y = (int)rf_random_below(80, seed, 6, 3, 0) - 20};
-        RfPatchMatch wanted = plain_scan(&query, channels), found = rf_patch_search(&picture, &query, &g_terms);
+        RfPatchMatch wanted = plain_scan(&query, channels, room), found = rf_patch_search(&picture, &query, &g_terms);
         if (found.x != wanted.x || found.y != wanted.y || (wanted.x >= 0 && found.distance != wanted.distance))
             fail_msg("seed %d, %d x %d: (%d, %d) %g, not (%d, %d) %g", (int)seed, query.width, query.height, found.x,
                      found.y, found.distance, wanted.x, wanted.y, wanted.distance);
