@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 build=$1
 out=$build/evaluation
 docs=docs/evaluation
-methods=(lagrangian lagrangian-fine optimize eulerian eulerian-short eulerian-long dual dual-plain sprites warp)
+methods=(lagrangian lagrangian-fine optimize directional eulerian eulerian-short eulerian-long dual dual-plain sprites warp)
 
 rm -rf "$out"
 mkdir -p "$out" "$docs"

@@ -72,6 +72,7 @@ static const MethodCase methods[] = {
     {"lagrangian", "lagrangian", "particle-radius=32", "relaxation", {0.3, 1.5, 3, 6, 12}, false},
     {"lagrangian fine", "lagrangian", "particle-radius=16 relaxation=7", "relaxation", {0.3, 1.5, 3, 7, 15, 40}, false},
     {"optimize", "optimize", "", NULL, {0}, false},
+    {"directional", "directional", "", NULL, {0}, false},
     {"lagrangian radius", "lagrangian", "relaxation=7", "particle-radius", {10, 12, 16, 24}, true},
     {"lagrangian distortion",
      "lagrangian",

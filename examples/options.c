@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prints a table of the library as Markdown, as it stands in docs/:
 //
-//     options lagrangian|eulerian|dual|sprites|warp|optimize|measure|quantities|flow|exemplar
+//     options lagrangian|eulerian|dual|sprites|warp|optimize|directional|measure|quantities|flow|exemplar
 //
 // Options of a method or of the measures, the quantities these give, or the built-in flows or exemplars. A test holds
 // the docs to it (cmake/doc_tables.sh).
@@ -115,6 +115,8 @@ int main(int argc, char **argv)
         table = rf_warp_option_table(&count);
     else if (strcmp(what, "optimize") == 0)
         table = rf_optimize_option_table(&count);
+    else if (strcmp(what, "directional") == 0)
+        table = rf_directional_option_table(&count);
     else if (strcmp(what, "measure") == 0)
         table = rf_measure_option_table(&count);
     else if (strcmp(what, "flow") == 0 || strcmp(what, "exemplar") == 0)
@@ -127,7 +129,8 @@ int main(int argc, char **argv)
     if (!table)
     {
         fprintf(stderr,
-                "usage: options lagrangian|eulerian|dual|sprites|warp|optimize|measure|quantities|flow|exemplar\n");
+                "usage: options lagrangian|eulerian|dual|sprites|warp|optimize|directional|measure|quantities|flow|"
+                "exemplar\n");
         return 2;
     }
     print_options(table, count);
