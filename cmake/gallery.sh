@@ -168,7 +168,7 @@ along() {
     done
     [ $row = 0 ] || "$build/examples/contact_sheet" "$out/$name.png" --columns 7 --cell 320 "${cells[@]}"
     if [ $row -gt 0 ] && [ "$docs" = --docs ] && [ "$licence" = free ]; then
-        publish "$name" 1920
+        publish "$name" 1120
     fi
 }
 
