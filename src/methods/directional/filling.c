@@ -30,8 +30,8 @@ typedef enum LayingKind
     LAY_OVER
 } LayingKind;
 
-// Of the exemplar's variance: what a patch costs whose look is shown as often as the exemplar has it. Canes in turbulence
-// keep 89 % of their contrast for 60 frames with it, without 82 %; from 0.5 on patches fit visibly worse.
+// Of the exemplar's variance: what a patch costs whose look is shown as often as the exemplar has it. Canes in
+// turbulence keep 89 % of their contrast for 60 frames with it, without 82 %; from 0.5 on patches fit visibly worse.
 static const float PRICE = 0.2f;
 // What is shown more often than this costs no more.
 static const float MOST_SHARE = 4;
