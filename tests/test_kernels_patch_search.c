@@ -21,7 +21,7 @@ enum
 static float g_picture[W * H * MOST_CHANNELS], g_box[RF_PATCH_BOX * RF_PATCH_BOX * MOST_CHANNELS];
 static float g_weights[RF_PATCH_BOX * RF_PATCH_BOX];
 static uint8_t g_valid[W * H], g_groups[W * H];
-static float g_prices[256];
+static float g_prices[RF_PATCH_GROUPS];
 static RfPatchTerms g_terms;
 
 static bool has_room(const RfPatchQuery *q, RfPatchRoom room, int x, int y)
@@ -67,8 +67,8 @@ static void draw(int channels, uint64_t seed, int levels)
     for (int i = 0; i < RF_PATCH_BOX * RF_PATCH_BOX; ++i)
         g_weights[i] = rf_random_below(3, seed, 3, (uint64_t)i, 0) ? 0 : rf_random_float(seed, 4, (uint64_t)i, 0);
     for (int i = 0; i < W * H; ++i)
-        g_groups[i] = (uint8_t)rf_random_below(256, seed, 7, (uint64_t)i, 0);
-    for (int i = 0; i < 256; ++i)
+        g_groups[i] = (uint8_t)rf_random_below(RF_PATCH_GROUPS, seed, 7, (uint64_t)i, 0);
+    for (int i = 0; i < RF_PATCH_GROUPS; ++i)
         g_prices[i] = floorf(4 * rf_random_float(seed, 8, (uint64_t)i, 0));
     memset(g_valid, 1, sizeof g_valid);
     for (int k = 0; k < 6; ++k)

@@ -25,7 +25,9 @@ enum
     VECTORS = 4,
     LANES = VECTORS * RF_WIDE_FLOATS,
     /// Numbers after which sums are looked at.
-    BLOCK = 24
+    BLOCK = 16,
+    /// The group of pixels that no box may have in its middle.
+    NO_ROOM = RF_PATCH_GROUPS
 };
 
 // Of RF_MAX_PATCH_TERMS sums in float: their rounding is less.
@@ -44,8 +46,11 @@ RfResult rf_patch_picture_create(const float *pixels, int width, int height, int
         rf_patch_picture_free(out);
         return RF_OUT_OF_MEMORY;
     }
-    if (groups)
-        memcpy(out->groups, groups, (size_t)width * (size_t)height);
+    for (size_t i = 0; i < (size_t)width * (size_t)height; ++i)
+    {
+        bool closed = room == RF_ROOM_OF_MIDDLE && valid && !valid[i];
+        out->groups[i] = closed ? NO_ROOM : groups ? groups[i] : 0;
+    }
     for (size_t y = 0; y < (size_t)height; ++y)
         for (size_t x = 0; x < (size_t)width; ++x)
         {
@@ -95,14 +100,15 @@ static bool fits(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
     return is_room(room_at(p, q, x, y), 0);
 }
 
-static float price_at(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
+// Infinite where only the middle is asked for and is not valid.
+static float price_at(const RfPatchPicture *p, const RfPatchQuery *q, const RfPatchTerms *terms, int x, int y)
 {
-    return q->prices ? q->prices[p->groups[(ptrdiff_t)(y + q->height / 2) * p->width + x + q->width / 2]] : 0;
+    return terms->prices[p->groups[(ptrdiff_t)(y + q->height / 2) * p->width + x + q->width / 2]];
 }
 
-static double distance_at(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y)
+static double distance_at(const RfPatchPicture *p, const RfPatchQuery *q, const RfPatchTerms *terms, int x, int y)
 {
-    double sum = (double)price_at(p, q, x, y);
+    double sum = (double)price_at(p, q, terms, x, y);
     for (int j = 0; j < q->height; ++j)
         for (int i = 0; i < q->width; ++i)
         {
@@ -147,6 +153,9 @@ static int step_of(int count)
 static void set_terms(const RfPatchPicture *p, const RfPatchQuery *q, RfPatchTerms *terms)
 {
     terms->count = count_terms(p, q);
+    for (int k = 0; k < RF_PATCH_GROUPS; ++k)
+        terms->prices[k] = q->prices ? q->prices[k] : 0;
+    terms->prices[NO_ROOM] = INFINITY;
     int known = terms->count / p->channels, step = step_of(known), at = 0;
     for (int i = 0; i < q->width * q->height; ++i)
     {
@@ -166,11 +175,16 @@ static void set_terms(const RfPatchPicture *p, const RfPatchQuery *q, RfPatchTer
 // Unaligned where it is read through a pointer.
 typedef float Vector __attribute__((vector_size(RF_WIDE_FLOATS * sizeof(float)), aligned(4), may_alias));
 
+typedef int Bits __attribute__((vector_size(RF_WIDE_FLOATS * sizeof(int)), aligned(4)));
+
 RF_WIDE_BODY void rf_sum_patch_terms_body(const float *first, const RfPatchTerms *terms, float limit, float *sums,
                                           bool *whole)
 {
     Vector own[VECTORS];
+    int above;
     memcpy(own, sums, sizeof own);
+    memcpy(&above, &limit, sizeof above);
+    ++above;
     *whole = false;
     for (int k = 0; k < terms->count; k += BLOCK)
     {
@@ -185,11 +199,16 @@ RF_WIDE_BODY void rf_sum_patch_terms_body(const float *first, const RfPatchTerms
                 own[v] += weight * d * d;
             }
         }
-        float now[LANES], least = INFINITY;
+        // Numbers of one sign are ordered as their bits are: a difference of bits is negative where a sum is at most
+        // the limit. (Compared as floats they would be taken apart, lane by lane.)
+        Bits now[VECTORS], below = {0};
         memcpy(now, own, sizeof now);
-        for (int l = 0; l < LANES; ++l)
-            least = now[l] < least ? now[l] : least;
-        if (least > limit)
+        for (int v = 0; v < VECTORS; ++v)
+            below |= now[v] - above;
+        int any = 0;
+        for (int l = 0; l < RF_WIDE_FLOATS; ++l)
+            any |= below[l];
+        if (any >= 0)
             return;
     }
     memcpy(sums, own, sizeof own);
@@ -207,19 +226,22 @@ static void take(RfPatchMatch *best, int x, int y, double distance)
 }
 
 // The price where the box has room, else infinity. False: it has room nowhere.
-static bool start_sums(const RfPatchPicture *p, const RfPatchQuery *q, int x, int y, float *sums)
+static bool start_sums(const RfPatchPicture *p, const RfPatchQuery *q, const RfPatchTerms *terms, int x, int y,
+                       float *sums)
 {
     Room there = room_at(p, q, x, y);
-    int count = rf_min_int(LANES, p->width - q->width + 1 - x), room = 0;
-    for (int l = 0; l < LANES; ++l)
-        sums[l] = INFINITY;
+    const uint8_t *groups = p->groups + (ptrdiff_t)(y + q->height / 2) * p->width + x + q->width / 2;
+    int count = rf_min_int(LANES, p->width - q->width + 1 - x);
+    bool room = false;
     for (int l = 0; l < count; ++l)
-    {
-        bool sound = is_room(there, l);
-        sums[l] = sound ? price_at(p, q, x + l, y) : INFINITY;
-        room += sound;
-    }
-    return room > 0;
+        sums[l] = terms->prices[groups[l]];
+    for (int l = 0; l < count && p->room == RF_ROOM_OF_ALL; ++l)
+        sums[l] = is_room(there, l) ? sums[l] : INFINITY;
+    for (int l = 0; l < count; ++l)
+        room |= sums[l] < INFINITY;
+    for (int l = count; l < LANES; ++l)
+        sums[l] = INFINITY;
+    return room;
 }
 
 static void try_lanes(const RfPatchPicture *p, const RfPatchQuery *q, const RfPatchTerms *terms, int x, int y,
@@ -227,7 +249,7 @@ static void try_lanes(const RfPatchPicture *p, const RfPatchQuery *q, const RfPa
 {
     float sums[LANES];
     float limit = best->x < 0 ? INFINITY : (float)best->distance * SLACK;
-    if (!start_sums(p, q, x, y, sums))
+    if (!start_sums(p, q, terms, x, y, sums))
         return;
     bool whole;
     rf_sum_patch_terms(p->planes + y * p->stride + x, terms, limit, sums, &whole);
@@ -236,7 +258,7 @@ static void try_lanes(const RfPatchPicture *p, const RfPatchQuery *q, const RfPa
     for (int l = 0; l < LANES; ++l)
         if (sums[l] <= limit && sums[l] < INFINITY)
         {
-            take(best, x + l, y, distance_at(p, q, x + l, y));
+            take(best, x + l, y, distance_at(p, q, terms, x + l, y));
             limit = (float)best->distance * SLACK;
         }
 }
@@ -247,7 +269,7 @@ RfPatchMatch rf_patch_search(const RfPatchPicture *p, const RfPatchQuery *q, RfP
     RfPatchMatch best = {-1, -1, INFINITY};
     set_terms(p, q, terms);
     if (fits(p, q, q->guess_x, q->guess_y))
-        take(&best, q->guess_x, q->guess_y, distance_at(p, q, q->guess_x, q->guess_y));
+        take(&best, q->guess_x, q->guess_y, distance_at(p, q, terms, q->guess_x, q->guess_y));
     for (int y = 0; y <= p->height - q->height; ++y)
         for (int x = 0; x <= p->width - q->width; x += LANES)
             try_lanes(p, q, terms, x, y, &best);

@@ -14,6 +14,7 @@ enum
 {
     /// Of a query's box.
     RF_PATCH_BOX = 64,
+    RF_PATCH_GROUPS = 64,
     RF_MAX_PATCH_TERMS = RF_PATCH_BOX * RF_PATCH_BOX * RF_MAX_EXEMPLAR_CHANNELS
 };
 
@@ -35,12 +36,12 @@ typedef struct RfPatchPicture
     /// [height + 1][width + 1]: how many pixels above and left of here are not valid.
     int32_t *invalid;
     RfPatchRoom room;
-    /// [height][width]: the group of each pixel, which is priced.
+    /// [height][width]: the group of each pixel, which is priced; RF_PATCH_GROUPS where no box may have its middle.
     uint8_t *groups;
 } RfPatchPicture;
 
 /// pixels: [height][width][channels], finite where they are looked at. valid: [height][width], 0: not valid; NULL: all
-/// are. groups: [height][width]; NULL: all 0.
+/// are. groups: [height][width], below RF_PATCH_GROUPS; NULL: all 0.
 RfResult rf_patch_picture_create(const float *pixels, int width, int height, int channels, const uint8_t *valid,
                                  const uint8_t *groups, RfPatchRoom room, RfPatchPicture *out);
 void rf_patch_picture_free(RfPatchPicture *picture);
@@ -51,7 +52,8 @@ typedef struct RfPatchQuery
     int width, height;
     /// [height][width][channels] and [height][width]: what is known, and how much it counts, 0: not known.
     const float *pixels, *weights;
-    /// What a place costs besides, by the group of the pixel in the box's middle; 0 or more. NULL: nothing.
+    /// [RF_PATCH_GROUPS]: what a place costs besides, by the group of the pixel in the box's middle; 0 or more. NULL:
+    /// nothing.
     const float *prices;
     /// A place that may fit well, from which the search starts. Any numbers: it changes the time, never the result.
     int guess_x, guess_y;
@@ -71,6 +73,7 @@ typedef struct RfPatchTerms
     int count;
     ptrdiff_t offset[RF_MAX_PATCH_TERMS];
     float value[RF_MAX_PATCH_TERMS], weight[RF_MAX_PATCH_TERMS];
+    float prices[RF_PATCH_GROUPS + 1];
 } RfPatchTerms;
 
 /// From inside: adds the differences from the query's numbers to the sums of places side by side, the first of which

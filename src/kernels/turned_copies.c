@@ -16,6 +16,8 @@ enum
     LOOK_RADIUS = 4
 };
 
+static_assert((int)RF_LOOKS == (int)RF_PATCH_GROUPS, "patches are priced by their look");
+
 typedef struct Turning
 {
     RfTurnedCopies *copies;
