@@ -295,7 +295,7 @@ static void no_pixel_of_the_fluid_is_without_texture(void **state)
         for (int i = 0; i < PIXELS; ++i)
             assert_true(!mask[i] || d->texels[i].copy >= 0);
         RfDirectionalStats stats = rf_directional_stats(d);
-        assert_true((t == 0) == (stats.filled == 0) && stats.filled < 0.25f && stats.renewed < 0.25f);
+        assert_true((t == 0) == (stats.filled == 0) && stats.filled < 0.3f && stats.renewed < 0.3f);
     }
     rf_directional_destroy(d);
     rf_exemplar_destroy(exemplar);
@@ -319,8 +319,8 @@ static float mean_gradient(const float *pixels)
     return (float)sum;
 }
 
-// The paper's figure 7.
-static void renewal_keeps_the_texture_sharp(void **state)
+// The paper's figure 7; but here the gradient stays without renewal, too.
+static void renewal_keeps_blends_few_and_the_texture_sharp(void **state)
 {
     (void)state;
     circles(2);
@@ -341,7 +341,7 @@ static void renewal_keeps_the_texture_sharp(void **state)
         blends[renewing] = mean_blends(d);
         rf_directional_destroy(d);
     }
-    if (!(gradients[1] > 0.93f * first && gradients[1] > gradients[0] && blends[1] < 2 && blends[0] > blends[1]))
+    if (!(gradients[1] > 0.95f * first && gradients[1] < 1.05f * first && blends[1] < 2 && blends[0] > 2))
         fail_msg("gradient %g, after 40 frames %g, without renewal %g; blends %g, %g", (double)first,
                  (double)gradients[1], (double)gradients[0], (double)blends[1], (double)blends[0]);
     rf_exemplar_destroy(exemplar);
@@ -367,6 +367,83 @@ static void a_cut_first_frame_is_not_blended(void **state)
     }
     assert_true(gradients[1] > gradients[0]);
     rf_exemplar_destroy(exemplar);
+}
+
+static void what_comes_into_view_is_filled_whenever_it_does(void **state)
+{
+    (void)state;
+    static uint8_t mask[PIXELS];
+    RfExemplar *exemplar = builtin("builtin:canes?size=64");
+    RfDirectional *d = make(exemplar, NULL);
+    circles(2);
+    memset(mask, 0, sizeof mask);
+    step(d, mask, 0, g_last); // no fluid at all
+    memset(mask, 1, sizeof mask / 2);
+    step(d, mask, 1, g_last);
+    memset(mask, 1, sizeof mask);
+    step(d, mask, 1, g_last); // the same moment once more
+    for (int i = 0; i < PIXELS; ++i)
+        assert_true(d->texels[i].copy >= 0);
+    rf_directional_destroy(d);
+    rf_exemplar_destroy(exemplar);
+}
+
+static void threads_may_change_from_step_to_step(void **state)
+{
+    (void)state;
+    circles(2);
+    RfExemplar *exemplar = builtin("builtin:canes?size=64");
+    for (int changing = 0; changing <= 1; ++changing)
+    {
+        RfDirectional *d = make(exemplar, NULL);
+        for (int t = 0; t <= 5; ++t)
+        {
+            rf_set_threads(changing ? 1 + 3 * t : 2);
+            step(d, NULL, t, changing ? g_last : g_first);
+        }
+        rf_directional_destroy(d);
+    }
+    rf_set_threads(0);
+    assert_memory_equal(g_first, g_last, sizeof g_last);
+    rf_exemplar_destroy(exemplar);
+}
+
+// A map of vectors along the exemplar's direction, also of one that is searched on a coarse level.
+static void vectors_point_along_the_flow(void **state)
+{
+    (void)state;
+    static float vectors[2 * 300 * 300], frame[2 * PIXELS];
+    for (int i = 0; i < 300 * 300; ++i)
+    {
+        vectors[2 * i] = 3;
+        vectors[2 * i + 1] = 0.2f * (float)(i % 7 == 0);
+    }
+    RfDirectionalOptions options = rf_directional_defaults();
+    options.direction = 0;
+    float angle = 2 * RF_PI / 24 * 5;
+    uniform(cosf(angle), sinf(angle));
+    for (int side = 80; side <= 300; side += 220)
+    {
+        RfMapView map = {"motion", RF_MAP_VECTOR, {vectors, side, side, 2, 2 * side}, 1};
+        RfExemplar *exemplar = NULL;
+        assert_int_equal(rf_exemplar_create(&map, 1, RF_TILING_NO, &exemplar), RF_OK);
+        RfDirectional *d = make(exemplar, &options);
+        for (int t = 0; t < 3; ++t)
+        {
+            RfFlowView flow = {.width = SIDE, .height = SIDE, .velocity = g_velocity, .time = t};
+            RfImageView view = {frame, SIDE, SIDE, 2, (ptrdiff_t)SIDE * 2};
+            assert_int_equal(rf_directional_step(d, &flow, &view), RF_OK);
+        }
+        assert_true((d->copies.size > 1) == (side > 256));
+        for (int i = 0; i < PIXELS; ++i)
+        {
+            float along = frame[2 * i] * cosf(angle) + frame[2 * i + 1] * sinf(angle);
+            float across = frame[2 * i + 1] * cosf(angle) - frame[2 * i] * sinf(angle);
+            assert_true(fabsf(along - 3) < 0.02f && across > -0.1f && across < 0.3f);
+        }
+        rf_directional_destroy(d);
+        rf_exemplar_destroy(exemplar);
+    }
 }
 
 // ---- what is refused, memory
@@ -465,8 +542,11 @@ int main(void)
         cmocka_unit_test(a_parallel_flow_carries_the_texture),
         cmocka_unit_test(speeds_are_limited),
         cmocka_unit_test(no_pixel_of_the_fluid_is_without_texture),
-        cmocka_unit_test(renewal_keeps_the_texture_sharp),
+        cmocka_unit_test(renewal_keeps_blends_few_and_the_texture_sharp),
         cmocka_unit_test(a_cut_first_frame_is_not_blended),
+        cmocka_unit_test(what_comes_into_view_is_filled_whenever_it_does),
+        cmocka_unit_test(threads_may_change_from_step_to_step),
+        cmocka_unit_test(vectors_point_along_the_flow),
         cmocka_unit_test(what_makes_no_sense_is_refused),
         cmocka_unit_test(memory_that_runs_out_leaks_nothing),
     };

@@ -30,7 +30,7 @@ typedef struct RfDirectionalOptions
     /// Same seed and same input: same bytes, with any number of threads. Default 1.
     uint64_t seed;
     /// Turned copies of the exemplar, n, 4 to 180. Default 24. Texture is replaced where the flow's direction differs
-    /// from its own by more than a 360 / n degrees: with more it lies closer along the flow, and is replaced sooner.
+    /// from its own by more than 360 / n degrees: with more it lies closer along the flow, and is replaced sooner.
     int rotations;
     /// The exemplar's main direction, which is to point downstream: degrees, 0 along its x axis, clockwise, up to 360;
     /// below 0 it is found (Tamura et al. 1978). Default -1.
@@ -43,7 +43,7 @@ typedef struct RfDirectionalOptions
     float velocity_spread;
     /// Pixels round a hole that a patch is matched with and fades into, D, 1 to 8. Default 4.
     int mask_width;
-    /// A cell is replaced when its pixels were blended more often than this in the mean, 0.1 to 1000; 0: never.
+    /// A cell is replaced when its pixels were blended more often than this in the mean, 0 to 1000; 0: never.
     /// Default 2.
     float renew_after;
     /// Speeds are limited to these, in pixels a frame, 0 to 1000; 0: not. Slow texture is carried by whole pixels as
@@ -75,7 +75,7 @@ typedef struct RfDirectionalStats
 {
     /// Degrees, as options.direction; and how much of a main direction the exemplar has, 0 to 1.
     float direction, directionality;
-    /// Directionality is so low that the texture will not show the flow's direction.
+    /// Directionality is so low that the texture will not show the flow's direction, and no direction was given.
     bool isotropic;
     /// Parts of the fluid's pixels: in holes that were filled, continued across cracks, in cells that were replaced.
     float filled, continued, renewed;

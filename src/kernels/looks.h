@@ -7,7 +7,7 @@
 // exemplar; here they follow the look, wherever in the exemplar it is.
 #pragma once
 
-#include "kernels/comparison.h"
+#include "riffle/base.h"
 
 enum
 {

@@ -12,6 +12,8 @@ enum
 {
     // Exemplars with longer sides are searched on a coarser level.
     SEARCHED_SIDE = 256,
+    // As long as the shorter ones keep this.
+    LEAST_SIDE = 64,
     // Of the square by which a pixel's look is told: about that of a patch.
     LOOK_RADIUS = 4
 };
@@ -240,7 +242,8 @@ RfResult rf_turned_copies_create(const RfSampler *sampler, const RfComparison *c
     const RfExemplar *e = sampler->exemplar;
     *out = (RfTurnedCopies){
         .count = count, .size = 1, .direction = direction, .sampler = sampler, .comparison = comparison};
-    while (rf_max_int(e->width, e->height) / out->size > SEARCHED_SIDE)
+    while (rf_max_int(e->width, e->height) > SEARCHED_SIDE * out->size &&
+           rf_min_int(e->width, e->height) >= LEAST_SIDE * 2 * out->size)
         out->size *= 2;
     find_axes(out);
     RfResult result = find_jacobians(out);

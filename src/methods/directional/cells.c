@@ -31,7 +31,7 @@ static RfVec2 limited(const RfDirectional *d, RfVec2 v, float frames)
           most = d->options.speed_max > 0 ? d->options.speed_max * frames : FARTHEST;
     most = rf_min(most, FARTHEST);
     float wanted = rf_clamp((float)rf_min((float)length, FARTHEST), rf_min(least, most), most);
-    if (length < (double)STANDSTILL)
+    if (length < (double)(STANDSTILL * frames))
         return (RfVec2){0, 0};
     return (RfVec2){(float)((double)v.x / length) * wanted, (float)((double)v.y / length) * wanted};
 }
@@ -63,6 +63,7 @@ static void read_row(void *context, int y, int worker)
 
 void rf_directional_read_flow(RfDirectional *d, const RfFlowView *flow, double from)
 {
+    d->frames = (float)(flow->time - from);
     Reading reading = {d, flow, from, flow->time > from ? rf_path_steps(flow, flow->time - from) : 0};
     rf_parallel_for(d->height, read_row, &reading);
 }
@@ -150,7 +151,7 @@ static bool velocities_agree(const RfDirectional *d, RfCell cell, bool (*wanted)
             farthest = rf_max(farthest, rf_vec2_length(rf_vec2_sub(d->velocity[pixel], mean)));
             slowest = rf_min(slowest, rf_vec2_length(d->velocity[pixel]));
         }
-    return farthest <= (d->options.cells == RF_CELLS_NEAR ? d->options.velocity_spread : slowest);
+    return farthest <= (d->options.cells == RF_CELLS_NEAR ? d->options.velocity_spread * d->frames : slowest);
 }
 
 static RfResult append(RfCellList *list, RfCell cell)

@@ -157,10 +157,9 @@ RfResult rf_directional_make_room(RfDirectional *d, int width, int height)
     d->region_columns = (width + RF_DIRECTIONAL_REGION - 1) / RF_DIRECTIONAL_REGION;
     d->region_rows = (height + RF_DIRECTIONAL_REGION - 1) / RF_DIRECTIONAL_REGION;
     d->prices = rf_allocate_zero((size_t)d->region_columns * (size_t)d->region_rows, sizeof *d->prices);
-    d->scratch = rf_allocate((size_t)rf_threads(), sizeof *d->scratch);
     bool enough = d->texels && d->next_texels && d->picture && d->next_picture && d->blended && d->next_blended &&
                   d->velocity && d->direction_at && d->inside && d->first && d->second && d->stack && d->loose &&
-                  d->prices && d->scratch;
+                  d->prices;
     if (!enough)
         return RF_OUT_OF_MEMORY;
     RF_TRY(rf_progress("turning the exemplar", 0));
@@ -228,7 +227,11 @@ RfResult rf_directional_advance(RfDirectional *d, const RfFlowView *flow, int wi
         RF_TRY(go_on(d, flow));
     }
     else
-        rf_directional_read_flow(d, flow, flow->time); // after a saved state it is not known yet
+    {
+        // After a saved state the flow is not known yet; and its mask may have grown.
+        rf_directional_read_flow(d, flow, flow->time);
+        RF_TRY(rf_directional_fill(d));
+    }
     d->fluid = 0;
     for (int i = 0; i < width * height; ++i)
         d->fluid += d->inside[i];
@@ -279,7 +282,7 @@ RfDirectionalStats rf_directional_stats(const RfDirectional *d)
         return stats;
     stats.direction = d->direction;
     stats.directionality = d->directionality;
-    stats.isotropic = d->directionality < ISOTROPIC;
+    stats.isotropic = d->directionality < ISOTROPIC && d->options.direction < 0;
     float part = d->fluid > 0 ? 1 / (float)d->fluid : 0;
     stats.filled = part * (float)d->filled;
     stats.continued = part * (float)d->continued;

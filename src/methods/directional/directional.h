@@ -99,7 +99,11 @@ struct RfDirectional
     RfCellList cells, holes;
     RfMove *moves;
     int move_room;
+    /// One a thread, as many as there ever were.
     RfPatchScratch *scratch;
+    int scratch_count;
+    /// Frames that this step goes.
+    float frames;
     /// Of each look in each region of the frame: what a patch of it costs, in parts of the exemplar's variance for each
     /// pixel that the patch is compared at.
     float (*prices)[RF_LOOKS];

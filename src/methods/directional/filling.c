@@ -126,6 +126,13 @@ static RfVec2 draw_place(const RfDirectional *d, int copy, RfCell box, uint64_t 
     return rf_vec2_add(middle, rf_jacobian_step(rf_turned_copy_jacobian(&d->copies, copy), back));
 }
 
+static const float *nearest_pixel(const RfExemplar *e, RfVec2 source)
+{
+    int x = rf_border_int(rf_nearest_int(source.x - 0.5f), e->width, e->tiles);
+    int y = rf_border_int(rf_nearest_int(source.y - 0.5f), e->height, e->tiles);
+    return e->pixels + ((ptrdiff_t)y * e->width + x) * e->channels;
+}
+
 // Of a place on the coarse level: the cost on the finest.
 static float cost_at(const RfDirectional *d, RfCell box, const RfPatchScratch *s, RfVec2 source, RfJacobian j,
                      float limit)
@@ -139,9 +146,13 @@ static float cost_at(const RfDirectional *d, RfCell box, const RfPatchScratch *s
             if (s->weights[y * box.width + x] == 0)
                 continue;
             RfVec2 at = rf_vec2_add(source, rf_jacobian_step(j, (RfVec2){(float)x, (float)y}));
-            int u = rf_border_int(rf_nearest_int(at.x - 0.5f), e->width, e->tiles);
-            int v = rf_border_int(rf_nearest_int(at.y - 0.5f), e->height, e->tiles);
-            const float *there = e->pixels + ((ptrdiff_t)v * e->width + u) * e->channels;
+            const float *there = nearest_pixel(e, at);
+            float turned[RF_SAMPLE_CHANNELS];
+            if (d->sampler.turns)
+            {
+                rf_sampler_at(&d->sampler, at, j, turned);
+                there = turned;
+            }
             const float *here = d->picture + ((ptrdiff_t)(box.y + y) * d->width + box.x + x) * (ptrdiff_t)e->channels;
             for (int c = 0; c < k->channels; ++c)
             {
@@ -223,9 +234,10 @@ static void lay(RfDirectional *d, RfCell box, int copy, RfVec2 source, LayingKin
         RfVec2 from = rf_vec2_add(source, rf_jacobian_step(j, (RfVec2){(float)x, (float)y}));
         float *out = d->picture + (ptrdiff_t)pixel * channels;
         rf_sampler_at(&d->sampler, from, j, values);
-        if (texel->copy < 0)
+        // Exactly where nothing is left of what was there: out + (value - out) would not be the value.
+        if (texel->copy < 0 || alpha == 1)
             memcpy(out, values, (size_t)channels * sizeof *out);
-        for (int c = 0; c < channels; ++c)
+        for (int c = 0; c < channels && alpha < 1; ++c)
             out[c] += alpha * (values[c] - out[c]);
         float blends = texel->copy < 0 || alpha == 1 ? 0 : kind == LAY_HOLES ? texel->blends + 1 : 1;
         if (alpha > 0.5f)
@@ -345,10 +357,26 @@ static void set_region_prices(void *context, int region, int worker)
         d->prices[region][k] *= d->options.spread * PRICE;
 }
 
+// The number of threads may have been raised since the last step.
+static RfResult make_scratch(RfDirectional *d)
+{
+    int threads = rf_threads();
+    if (threads <= d->scratch_count)
+        return RF_OK;
+    rf_release(d->scratch);
+    d->scratch_count = 0;
+    d->scratch = rf_allocate((size_t)threads, sizeof *d->scratch);
+    if (!d->scratch)
+        return RF_OUT_OF_MEMORY;
+    d->scratch_count = threads;
+    return RF_OK;
+}
+
 static RfResult lay_all(RfDirectional *d, const RfCellList *list, LayingKind kind, const char *stage)
 {
     if (list->count == 0)
         return RF_OK;
+    RF_TRY(make_scratch(d));
     Waves waves;
     RfResult result = make_waves(d, list, &waves);
     Laying laying = {d, list, waves.order, 0, kind, d->laid};
@@ -377,7 +405,8 @@ RfResult rf_directional_start(RfDirectional *d)
     for (int i = 0; i < d->width * d->height; ++i)
         d->texels[i] = (RfTexel){.copy = -1};
     RF_TRY(rf_directional_split_frame(d, &d->holes));
-    qsort(d->holes.cells, (size_t)d->holes.count, sizeof *d->holes.cells, by_row);
+    if (d->holes.count > 0)
+        qsort(d->holes.cells, (size_t)d->holes.count, sizeof *d->holes.cells, by_row);
     return lay_all(d, &d->holes, LAY_FIRST, "first frame");
 }
 
@@ -425,7 +454,8 @@ RfResult rf_directional_fill(RfDirectional *d)
 
 // ---- what was blended too often
 
-static bool is_over_blended(const RfDirectional *d, RfCell cell)
+// Returns how many pixels of the fluid it has if it is, else 0.
+static int over_blended(const RfDirectional *d, RfCell cell)
 {
     float blends = 0;
     int count = 0;
@@ -436,7 +466,7 @@ static bool is_over_blended(const RfDirectional *d, RfCell cell)
                 blends += d->texels[y * d->width + x].blends;
                 ++count;
             }
-    return blends > d->options.renew_after * (float)count;
+    return blends > d->options.renew_after * (float)count ? count : 0;
 }
 
 RfResult rf_directional_renew(RfDirectional *d)
@@ -444,15 +474,15 @@ RfResult rf_directional_renew(RfDirectional *d)
     if (d->options.renew_after == 0)
         return RF_OK;
     RF_TRY(rf_directional_split_frame(d, &d->cells));
-    d->holes.count = 0;
     int kept = 0;
     for (int i = 0; i < d->cells.count; ++i)
-        if (is_over_blended(d, d->cells.cells[i]))
-        {
-            RfCell cell = d->cells.cells[i];
+    {
+        RfCell cell = d->cells.cells[i];
+        int pixels = over_blended(d, cell);
+        d->renewed += pixels;
+        if (pixels > 0)
             d->cells.cells[kept++] = cell;
-            d->renewed += (int64_t)cell.width * cell.height;
-        }
+    }
     d->cells.count = kept;
     return lay_all(d, &d->cells, LAY_OVER, NULL);
 }

@@ -52,7 +52,7 @@ void rf_directional_mask_hole(const RfDirectional *d, RfCell cell, RfCell box, R
 // All of the cell; the patch fades in from the cell's border, unless that is the frame's.
 void rf_directional_mask_cell(const RfDirectional *d, RfCell cell, RfPatchScratch *s)
 {
-    int reach = rf_min_int(d->options.mask_width, rf_min_int(cell.width, cell.height) / 8);
+    int reach = rf_min_int(d->options.mask_width, rf_min_int(cell.width, cell.height) / 4);
     for (int j = 0; j < cell.height; ++j)
         for (int i = 0; i < cell.width; ++i)
         {
@@ -122,8 +122,11 @@ void rf_directional_cut(const RfDirectional *d, RfCell cell, RfCell box, int cop
     rf_ring_cut(&s->ring, path);
     for (int i = 0; i < box.width * box.height; ++i)
     {
-        int angle, ring = ring_of(cell, box.x + i % box.width, box.y + i / box.width, &angle);
-        if (ring > 0 && s->alpha[i] > 0)
-            s->alpha[i] = ring <= path[angle] ? 1 : 0; // the line itself lies on ring path + 1
+        int x = box.x + i % box.width, y = box.y + i / box.width, angle;
+        bool in_cell = x >= cell.x && y >= cell.y && x < cell.x + cell.width && y < cell.y + cell.height;
+        if (in_cell || s->alpha[i] == 0)
+            continue;
+        int ring = ring_of(cell, x, y, &angle);
+        s->alpha[i] = ring <= path[angle] ? 1 : 0; // the line itself lies on ring path + 1
     }
 }

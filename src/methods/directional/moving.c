@@ -5,7 +5,6 @@
 // and added the next time. Where several cells land on a pixel, the one whose velocity is nearest to the flow's there
 // stays. A pixel is then without texture where none landed, or where the texture lies off the flow.
 #include "core/parallel.h"
-#include "core/result.h"
 #include "methods/directional/directional.h"
 
 #include <string.h>

@@ -32,8 +32,7 @@ static const RfOption g_options[] = {
      "seems to go backwards."},
     {"spread", RF_OPTION_FLOAT, offsetof(RfDirectionalOptions, spread), "", 0, 20, 1, NULL,
      "How dear patches are of a look that is shown too often already; 0: they are chosen by fit alone, as in the "
-     "paper, "
-     "and plain ones crowd out the others."},
+     "paper, and plain ones crowd out the others."},
     {"seam", RF_OPTION_CHOICE, offsetof(RfDirectionalOptions, seam), "", 0, 1, RF_SEAM_FEATHER, "feather|cut",
      "How patches meet in the first frame: they fade into each other, or are cut where they differ least."},
 };
