@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Directional moving texture.
 #include "core/maths.h"
+#include "core/saved_state.h"
 #include "methods/directional/directional.h"
 #include "riffle/riffle.h"
 #include "support/sanitized.h"
@@ -483,6 +484,64 @@ static void what_makes_no_sense_is_refused(void **state)
 #endif
 }
 
+// With a true hash: only what the numbers say can be refused.
+static RfResult load_changed(const RfExemplar *exemplar, const uint8_t *block, size_t size, size_t offset,
+                             const void *value, size_t bytes)
+{
+    RfDirectionalOptions options = rf_directional_defaults();
+    uint8_t *copy = malloc(size);
+    RfStateHead head;
+    RfDirectional *loaded = NULL;
+    assert_non_null(copy);
+    memcpy(copy, block, size);
+    memcpy(copy + offset, value, bytes);
+    memcpy(&head, copy, sizeof head);
+    rf_state_seal(copy, size, "directional", head.version, head.inputs);
+    RfResult result = rf_directional_load(exemplar, &options, copy, size, &loaded);
+    rf_directional_destroy(loaded);
+    free(copy);
+    return result;
+}
+
+static void a_state_with_a_true_hash_and_absurd_numbers_is_refused(void **state)
+{
+    (void)state;
+    enum
+    {
+        HEADER = sizeof(RfStateHead) + 40,
+        SIZE = sizeof(RfStateHead),
+        TIME = sizeof(RfStateHead) + 16,
+        TEXEL = HEADER + 100 * sizeof(RfTexel),
+        BLENDED = HEADER + PIXELS * sizeof(RfTexel)
+    };
+    circles(2);
+    RfExemplar *exemplar = builtin("builtin:canes?size=64");
+    RfDirectional *d = make(exemplar, NULL);
+    for (int t = 0; t < 3; ++t)
+        step(d, NULL, t, g_last);
+    void *block = NULL;
+    size_t size = 0;
+    assert_int_equal(rf_directional_save(d, &block, &size), RF_OK);
+    assert_int_equal(size, BLENDED + sizeof g_last);
+    static const float numbers[] = {NAN, INFINITY, -INFINITY};
+    static const int copies[] = {-2, 24, 1 << 30};
+    assert_int_equal(load_changed(exemplar, block, size, TEXEL + offsetof(RfTexel, copy), &(int){23}, 4), RF_OK);
+    for (int i = 0; i < 3; ++i)
+    {
+        const size_t fields[] = {TEXEL + offsetof(RfTexel, source), TEXEL + offsetof(RfTexel, rest),
+                                 TEXEL + offsetof(RfTexel, blends), BLENDED + 400};
+        for (int k = 0; k < 4; ++k)
+            assert_int_equal(load_changed(exemplar, block, size, fields[k], &numbers[i], 4), RF_BAD_INPUT);
+        assert_int_equal(load_changed(exemplar, block, size, TEXEL + offsetof(RfTexel, copy), &copies[i], 4),
+                         RF_BAD_INPUT);
+        assert_int_equal(load_changed(exemplar, block, size, TIME, &(double){(double)numbers[i]}, 8), RF_BAD_INPUT);
+        assert_int_equal(load_changed(exemplar, block, size, SIZE, &copies[i], 4), RF_BAD_INPUT);
+    }
+    rf_free(block);
+    rf_directional_destroy(d);
+    rf_exemplar_destroy(exemplar);
+}
+
 static RfResult live(const RfExemplar *exemplar, float *pixels)
 {
     RfDirectionalOptions options = rf_directional_defaults();
@@ -548,6 +607,7 @@ int main(void)
         cmocka_unit_test(threads_may_change_from_step_to_step),
         cmocka_unit_test(vectors_point_along_the_flow),
         cmocka_unit_test(what_makes_no_sense_is_refused),
+        cmocka_unit_test(a_state_with_a_true_hash_and_absurd_numbers_is_refused),
         cmocka_unit_test(memory_that_runs_out_leaks_nothing),
     };
     return cmocka_run_group_tests_name("directional", tests, NULL, NULL);

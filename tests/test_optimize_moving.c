@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The moving form of texture optimisation.
-#include "core/hash.h"
+#include "core/saved_state.h"
 #include "kernels/nearest_known.h"
 #include "methods/optimize/moving.h"
 #include "riffle/riffle.h"
@@ -178,10 +178,9 @@ static void a_state_goes_on_with_the_same_bytes_and_a_damaged_one_is_refused(voi
 enum
 {
     // Bytes of a state's header and of a marker in it, and where numbers lie in them.
-    HEADER = 64,
-    CONTENT = 24,
-    TIME = 48,
-    DISTANCE = 56,
+    HEADER = 72,
+    TIME = 56,
+    DISTANCE = 64,
     RECORD = 44,
     AT = 0,
     SOURCE = 12,
@@ -194,10 +193,9 @@ enum
 // As if it had been saved like this.
 static void sign(uint8_t *block, size_t size)
 {
-    uint64_t content = 0;
-    memcpy(block + CONTENT, &content, sizeof content);
-    content = rf_hash_bytes(block + HEADER, size - HEADER, rf_hash_bytes(block, HEADER, 0));
-    memcpy(block + CONTENT, &content, sizeof content);
+    RfStateHead head;
+    memcpy(&head, block, sizeof head);
+    rf_state_seal(block, size, "optimize", head.version, head.inputs);
 }
 
 static RfResult load_changed(const RfExemplar *exemplar, const uint8_t *block, size_t size, size_t offset,

@@ -14,12 +14,11 @@
 // jump at the shore.
 #include "kernels/coordinates.h"
 
-#include "core/hash.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/result.h"
-#include "core/simd.h"
+#include "core/saved_state.h"
 #include "kernels/cubic_spline.h"
 #include "kernels/nearest_known.h"
 #include "kernels/tracing.h"
@@ -177,90 +176,51 @@ RfJacobian rf_coordinates_jacobian(const RfCoordinates *c, int set, int x, int y
 
 enum
 {
-    STATE_VERSION = 2
+    STATE_VERSION = 3
 };
 
 typedef struct StateHeader
 {
-    char magic[8];
-    uint32_t version, simd;
-    /// Given by the method; and of the whole block with this field 0.
-    uint64_t inputs, content;
+    RfStateHead head;
     int32_t width, height, sets, padding;
     double start, time;
 } StateHeader;
 
-static uint64_t content_hash(StateHeader header, const void *offsets, size_t size)
-{
-    header.content = 0;
-    return rf_hash_bytes(offsets, size, rf_hash_bytes(&header, sizeof header, 0));
-}
-
-static void copy_magic(char to[8], const char *magic)
-{
-    memset(to, 0, 8);
-    memcpy(to, magic, strlen(magic));
-}
-
-RfResult rf_coordinates_save(const RfCoordinates *c, const char *magic, uint64_t inputs, void **block, size_t *size)
+RfResult rf_coordinates_save(const RfCoordinates *c, const char *method, uint64_t inputs, void **block, size_t *size)
 {
     *block = NULL;
-    StateHeader header = {.version = STATE_VERSION,
-                          .simd = (uint32_t)rf_simd_level(),
-                          .inputs = inputs,
-                          .width = c->width,
-                          .height = c->height,
-                          .sets = c->sets,
-                          .start = c->start,
-                          .time = c->time};
-    copy_magic(header.magic, magic);
+    StateHeader header = {.width = c->width, .height = c->height, .sets = c->sets, .start = c->start, .time = c->time};
     size_t offsets = 2 * sizeof(float) * (size_t)c->sets * (size_t)c->width * (size_t)c->height;
     uint8_t *bytes = rf_allocate(sizeof header + offsets, 1);
     if (!bytes)
         return RF_OUT_OF_MEMORY;
     if (offsets)
         memcpy(bytes + sizeof header, c->offset, offsets);
-    header.content = content_hash(header, bytes + sizeof header, offsets);
     memcpy(bytes, &header, sizeof header);
+    rf_state_seal(bytes, sizeof header + offsets, method, STATE_VERSION, inputs);
     *block = bytes;
     *size = sizeof header + offsets;
     return RF_OK;
 }
 
-static RfResult check_state(const StateHeader *header, int sets, const char *magic, uint64_t inputs, const void *block,
-                            size_t size)
+static bool has_its_size(const StateHeader *header, int sets, size_t size)
 {
-    char wanted[8];
-    copy_magic(wanted, magic);
-    if (memcmp(header->magic, wanted, 8) != 0)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "not a saved state of %s", magic);
-    if (header->version != STATE_VERSION)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved by version %u of the format, this is %d: start again",
-                       header->version, STATE_VERSION);
-    if (header->simd != (uint32_t)rf_simd_level())
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved under another instruction set: set RF_SIMD as it was");
-    if (header->inputs != inputs)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved with another exemplar or other options: start again");
     bool empty = header->width == 0 && header->height == 0;
     bool sized = header->width >= 1 && header->width <= RF_MAX_SIZE && header->height >= 1 &&
                  header->height <= RF_MAX_SIZE && isfinite(header->start) && isfinite(header->time) &&
                  header->start <= header->time;
     uint64_t offsets = 2 * sizeof(float) * (uint64_t)(uint32_t)sets * (uint64_t)(uint32_t)header->width *
                        (uint64_t)(uint32_t)header->height;
-    if (header->sets != sets || (!empty && !sized) || size - sizeof *header != offsets ||
-        header->content != content_hash(*header, (const uint8_t *)block + sizeof *header, size - sizeof *header))
-        return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
-    return RF_OK;
+    return header->sets == sets && (empty || sized) && size - sizeof *header == offsets;
 }
 
-RfResult rf_coordinates_load(RfCoordinates *out, const char *magic, uint64_t inputs, const void *block, size_t size)
+RfResult rf_coordinates_load(RfCoordinates *out, const char *method, uint64_t inputs, const void *block, size_t size)
 {
     StateHeader header;
-    if (size < sizeof header)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "a saved state is at least %zu bytes, this is %zu", sizeof header,
-                       size);
+    RF_TRY(rf_state_check(block, size, sizeof header, method, STATE_VERSION, inputs));
     memcpy(&header, block, sizeof header);
-    RF_TRY(check_state(&header, out->sets, magic, inputs, block, size));
+    if (!has_its_size(&header, out->sets, size))
+        return rf_state_damaged();
     if (header.width)
     {
         RF_TRY(place(out, header.width, header.height));

@@ -41,10 +41,10 @@ static inline RfVec2 rf_coordinates_offset(const RfCoordinates *c, int set, int 
 /// Central differences, one-sided at the frame's border.
 RfJacobian rf_coordinates_jacobian(const RfCoordinates *coordinates, int set, int x, int y);
 
-/// One relocatable block. `magic` (7 characters at most) names the method, `inputs` is a hash of all that the
+/// One relocatable block. `method` is its name, `inputs` is a hash of all that the
 /// coordinates depend on besides the flow.
-RfResult rf_coordinates_save(const RfCoordinates *coordinates, const char *magic, uint64_t inputs, void **block,
+RfResult rf_coordinates_save(const RfCoordinates *coordinates, const char *method, uint64_t inputs, void **block,
                              size_t *size);
 /// `out` holds the number of sets and nothing else. RF_BAD_INPUT for a block of another method, version, instruction
 /// set or inputs, and for a damaged one.
-RfResult rf_coordinates_load(RfCoordinates *out, const char *magic, uint64_t inputs, const void *block, size_t size);
+RfResult rf_coordinates_load(RfCoordinates *out, const char *method, uint64_t inputs, const void *block, size_t size);

@@ -139,8 +139,8 @@ static uint64_t inputs_hash(const RfExemplar *exemplar, const RfDualOptions *opt
 RfResult rf_dual_save(const RfDual *dual, void **block, size_t *size)
 {
     RF_REQUIRE(dual && block && size, "rf_dual_save: dual, block or size is NULL");
-    return rf_coordinates_save(&dual->coordinates, "rf-dual", inputs_hash(dual->sampler.exemplar, &dual->options),
-                               block, size);
+    return rf_coordinates_save(&dual->coordinates, "dual", inputs_hash(dual->sampler.exemplar, &dual->options), block,
+                               size);
 }
 
 RfResult rf_dual_load(const RfExemplar *exemplar, const RfDualOptions *options, const void *block, size_t size,
@@ -148,7 +148,7 @@ RfResult rf_dual_load(const RfExemplar *exemplar, const RfDualOptions *options, 
 {
     RF_REQUIRE(block, "rf_dual_load: block is NULL");
     RF_TRY(rf_dual_create(exemplar, options, out));
-    RfResult result = rf_coordinates_load(&(*out)->coordinates, "rf-dual", inputs_hash(exemplar, options), block, size);
+    RfResult result = rf_coordinates_load(&(*out)->coordinates, "dual", inputs_hash(exemplar, options), block, size);
     if (result != RF_OK)
     {
         rf_dual_destroy(*out);

@@ -310,7 +310,7 @@ static uint64_t inputs_hash(const RfExemplar *exemplar, const RfEulerianOptions 
 RfResult rf_eulerian_save(const RfEulerian *eulerian, void **block, size_t *size)
 {
     RF_REQUIRE(eulerian && block && size, "rf_eulerian_save: eulerian, block or size is NULL");
-    return rf_coordinates_save(&eulerian->coordinates, "rf-eule",
+    return rf_coordinates_save(&eulerian->coordinates, "eulerian",
                                inputs_hash(eulerian->sampler.exemplar, &eulerian->options), block, size);
 }
 
@@ -319,7 +319,8 @@ RfResult rf_eulerian_load(const RfExemplar *exemplar, const RfEulerianOptions *o
 {
     RF_REQUIRE(block, "rf_eulerian_load: block is NULL");
     RF_TRY(rf_eulerian_create(exemplar, options, out));
-    RfResult result = rf_coordinates_load(&(*out)->coordinates, "rf-eule", inputs_hash(exemplar, options), block, size);
+    RfResult result =
+        rf_coordinates_load(&(*out)->coordinates, "eulerian", inputs_hash(exemplar, options), block, size);
     if (result != RF_OK)
     {
         rf_eulerian_destroy(*out);

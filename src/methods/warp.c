@@ -98,8 +98,8 @@ static uint64_t inputs_hash(const RfExemplar *exemplar, const RfWarpOptions *opt
 RfResult rf_warp_save(const RfWarp *warp, void **block, size_t *size)
 {
     RF_REQUIRE(warp && block && size, "rf_warp_save: warp, block or size is NULL");
-    return rf_coordinates_save(&warp->coordinates, "rf-warp", inputs_hash(warp->sampler.exemplar, &warp->options),
-                               block, size);
+    return rf_coordinates_save(&warp->coordinates, "warp", inputs_hash(warp->sampler.exemplar, &warp->options), block,
+                               size);
 }
 
 RfResult rf_warp_load(const RfExemplar *exemplar, const RfWarpOptions *options, const void *block, size_t size,
@@ -107,7 +107,7 @@ RfResult rf_warp_load(const RfExemplar *exemplar, const RfWarpOptions *options, 
 {
     RF_REQUIRE(block, "rf_warp_load: block is NULL");
     RF_TRY(rf_warp_create(exemplar, options, out));
-    RfResult result = rf_coordinates_load(&(*out)->coordinates, "rf-warp", inputs_hash(exemplar, options), block, size);
+    RfResult result = rf_coordinates_load(&(*out)->coordinates, "warp", inputs_hash(exemplar, options), block, size);
     if (result != RF_OK)
     {
         rf_warp_destroy(*out);

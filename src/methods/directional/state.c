@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Saved states: a header, where every pixel's texture comes from, what it is blended with.
-#include "core/hash.h"
 #include "core/memory.h"
 #include "core/options.h"
 #include "core/parallel.h"
 #include "core/result.h"
-#include "core/simd.h"
+#include "core/saved_state.h"
 #include "methods/directional/directional.h"
 
 #include <string.h>
@@ -15,31 +14,22 @@ enum
     STATE_VERSION = 1
 };
 
+static const char STATE_METHOD[] = "directional";
+
 typedef struct StateHeader
 {
-    char magic[8];
-    uint32_t version, simd;
-    /// Of exemplar and options; and of the whole block with this field 0.
-    uint64_t inputs, content;
+    RfStateHead head;
     int32_t width, height;
     int64_t placed;
     double time;
     uint64_t laid, steps;
 } StateHeader;
 
-static const char g_magic[8] = "rf-dire";
-
 static uint64_t inputs_hash(const RfExemplar *exemplar, const RfDirectionalOptions *options)
 {
     int count;
     const RfOption *table = rf_directional_option_table(&count);
     return rf_options_hash(options, table, count, exemplar->hash);
-}
-
-static uint64_t content_hash(StateHeader header, const void *rest, size_t size)
-{
-    header.content = 0;
-    return rf_hash_bytes(rest, size, rf_hash_bytes(&header, sizeof header, 0));
 }
 
 static size_t rest_size(const RfExemplar *exemplar, int width, int height)
@@ -54,10 +44,6 @@ RfResult rf_directional_save(const RfDirectional *d, void **block, size_t *size)
     *block = NULL;
     StateHeader header;
     memset(&header, 0, sizeof header);
-    memcpy(header.magic, g_magic, sizeof header.magic);
-    header.version = STATE_VERSION;
-    header.simd = (uint32_t)rf_simd_level();
-    header.inputs = inputs_hash(d->exemplar, &d->options);
     header.placed = d->placed;
     header.width = d->width;
     header.height = d->height;
@@ -74,32 +60,19 @@ RfResult rf_directional_save(const RfDirectional *d, void **block, size_t *size)
         memcpy(bytes + sizeof header, d->texels, texels);
         memcpy(bytes + sizeof header + texels, d->blended, rest - texels);
     }
-    header.content = content_hash(header, bytes + sizeof header, rest);
     memcpy(bytes, &header, sizeof header);
+    rf_state_seal(bytes, sizeof header + rest, STATE_METHOD, STATE_VERSION, inputs_hash(d->exemplar, &d->options));
     *block = bytes;
     *size = sizeof header + rest;
     return RF_OK;
 }
 
-static RfResult check_state(const StateHeader *h, const RfExemplar *exemplar, uint64_t inputs, const void *block,
-                            size_t size)
+static bool has_its_size(const StateHeader *h, const RfExemplar *exemplar, size_t size)
 {
-    if (memcmp(h->magic, g_magic, sizeof g_magic) != 0)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "not a saved state of directional");
-    if (h->version != STATE_VERSION)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved by version %u of the format, this is %d: start again",
-                       h->version, STATE_VERSION);
-    if (h->simd != (uint32_t)rf_simd_level())
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved under another instruction set: set RF_SIMD as it was");
-    if (h->inputs != inputs)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved with another exemplar or other options: start again");
     bool sized = h->placed == 1 && h->width >= 8 && h->width <= RF_MAX_SIZE && h->height >= 8 &&
                  h->height <= RF_MAX_SIZE && isfinite(h->time);
     size_t rest = size - sizeof *h;
-    bool whole = sized ? rest == rest_size(exemplar, h->width, h->height) : h->placed == 0 && !rest;
-    if (!whole || h->content != content_hash(*h, (const uint8_t *)block + sizeof *h, rest))
-        return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
-    return RF_OK;
+    return sized ? rest == rest_size(exemplar, h->width, h->height) : h->placed == 0 && !rest;
 }
 
 static bool is_sound(const RfDirectional *d, const RfTexel *t)
@@ -130,7 +103,7 @@ static RfResult restore(RfDirectional *d, const StateHeader *h, const uint8_t *r
     for (size_t i = 0; i < pixels * (size_t)d->exemplar->channels; ++i)
         sound &= isfinite(d->blended[i]) != 0;
     if (!sound)
-        return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
+        return rf_state_damaged();
     rf_parallel_for(h->height, show_row, d);
     d->time = h->time;
     d->laid = h->laid;
@@ -145,14 +118,12 @@ RfResult rf_directional_load(const RfExemplar *exemplar, const RfDirectionalOpti
     RF_REQUIRE(block, "rf_directional_load: block is NULL");
     RF_TRY(rf_directional_create(exemplar, options, out));
     StateHeader header;
-    RfResult result = RF_OK;
-    if (size < sizeof header)
-        result = rf_fail(RF_BAD_INPUT, NULL, "header", "a saved state is at least %zu bytes, this is %zu",
-                         sizeof header, size);
-    else
+    RfResult result =
+        rf_state_check(block, size, sizeof header, STATE_METHOD, STATE_VERSION, inputs_hash(exemplar, options));
+    if (result == RF_OK)
     {
         memcpy(&header, block, sizeof header);
-        result = check_state(&header, exemplar, inputs_hash(exemplar, options), block, size);
+        result = has_its_size(&header, exemplar, size) ? RF_OK : rf_state_damaged();
     }
     if (result == RF_OK && header.placed)
         result = restore(*out, &header, (const uint8_t *)block + sizeof header, size - sizeof header);

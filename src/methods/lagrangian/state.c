@@ -8,39 +8,31 @@
 #include "core/maths.h"
 #include "core/options.h"
 #include "core/result.h"
-#include "core/simd.h"
+#include "core/saved_state.h"
 
 enum
 {
-    VERSION = 3
+    VERSION = 4
 };
 
-static const char magic[8] = "RFLAGRAN";
+static const char METHOD[] = "lagrangian";
 
 typedef struct Header
 {
-    char magic[8];
-    uint32_t version, header_size, grid_size, simd;
-    /// Of the header, with this as 0, and of everything behind it.
-    uint64_t content_hash;
-    uint64_t exemplar_hash, options_hash;
+    RfStateHead head;
     int32_t width, height, count, started;
     double time;
     uint64_t step;
     uint32_t next_id, padding;
 } Header;
 
-static uint64_t hash_options(const RfLagrangian *l)
+// The sprites' own particles are no one else's.
+static uint64_t inputs_hash(const RfLagrangian *l)
 {
     int count;
     const RfOption *table = rf_lagrangian_option_table(&count);
-    return rf_options_hash(&l->options, table, count, VERSION + (l->rigid ? 256 : 0) + (l->turning ? 512 : 0));
-}
-
-static uint64_t hash_content(Header header, const uint8_t *content, size_t size)
-{
-    header.content_hash = 0;
-    return rf_hash_bytes(content, size, rf_hash_bytes(&header, sizeof header, VERSION));
+    uint64_t kind = (l->rigid ? 1u : 0u) + (l->turning ? 2u : 0u);
+    return rf_options_hash(&l->options, table, count, rf_hash_bytes(&kind, sizeof kind, l->exemplar->hash));
 }
 
 static size_t vertex_bytes(const RfLagrangian *l)
@@ -64,48 +56,28 @@ RfResult rf_lagrangian_save(const RfLagrangian *l, void **block, size_t *size)
         memcpy(end, parts[i], part);
         end += part;
     }
-    Header header = {.version = VERSION,
-                     .header_size = sizeof(Header),
-                     .grid_size = sizeof(Grid),
-                     .simd = (uint32_t)rf_simd_level(),
-                     .exemplar_hash = l->exemplar->hash,
-                     .options_hash = hash_options(l),
-                     .width = l->width,
+    Header header = {.width = l->width,
                      .height = l->height,
                      .count = l->count,
                      .started = l->started,
                      .time = l->time,
                      .step = l->step,
                      .next_id = l->next_id};
-    memcpy(header.magic, magic, sizeof magic);
-    header.content_hash = hash_content(header, bytes + sizeof header, total - sizeof header);
     memcpy(bytes, &header, sizeof header);
+    rf_state_seal(bytes, total, METHOD, VERSION, inputs_hash(l));
     *block = bytes;
     *size = total;
     return RF_OK;
 }
 
-static RfResult check_header(const Header *header, const RfLagrangian *l, const void *block, size_t size)
+static bool has_its_size(const Header *header, const RfLagrangian *l, size_t size)
 {
-    if (memcmp(header->magic, magic, sizeof magic) != 0 || header->version != VERSION ||
-        header->header_size != sizeof(Header) || header->grid_size != sizeof(Grid))
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "not a saved state of this version: start again without it");
-    if (header->simd != (uint32_t)rf_simd_level())
-        return rf_fail(RF_BAD_INPUT, NULL, "header",
-                       "saved with another instruction set than %s: set RF_SIMD to it, or start again", rf_simd_name());
-    if (header->exemplar_hash != l->exemplar->hash || header->options_hash != hash_options(l))
-        return rf_fail(RF_BAD_INPUT, NULL, "header",
-                       "saved with another exemplar or other options: start again without it");
     size_t vertices = (size_t)(l->options.grid_vertices * l->options.grid_vertices) * sizeof(float);
     // Before the first step there is no size yet.
     int least = header->started ? 1 : 0;
-    bool sizes_fit = header->count >= 0 && header->width >= least && header->width <= RF_MAX_SIZE &&
-                     header->height >= least && header->height <= RF_MAX_SIZE && isfinite(header->time) &&
-                     size == sizeof(Header) + (size_t)header->count * (sizeof(Grid) + 3 * vertices);
-    if (!sizes_fit ||
-        header->content_hash != hash_content(*header, (const uint8_t *)block + sizeof(Header), size - sizeof(Header)))
-        return rf_fail(RF_BAD_INPUT, NULL, "content", "the saved state is damaged: start again without it");
-    return RF_OK;
+    return header->count >= 0 && header->width >= least && header->width <= RF_MAX_SIZE && header->height >= least &&
+           header->height <= RF_MAX_SIZE && isfinite(header->time) &&
+           size == sizeof(Header) + (size_t)header->count * (sizeof(Grid) + 3 * vertices);
 }
 
 static RfResult copy_content(RfLagrangian *l, const Header *header, const void *block)
@@ -129,19 +101,17 @@ static RfResult copy_content(RfLagrangian *l, const Header *header, const void *
     }
     for (int i = 0; i < l->count; ++i)
         if (l->grids[i].resemblance_count < 0 || l->grids[i].resemblance_count > MAX_RESEMBLANCES)
-            return rf_fail(RF_BAD_INPUT, NULL, "content", "the saved state is damaged: start again without it");
+            return rf_state_damaged();
     return RF_OK;
 }
 
 RfResult rf_lagrangian_restore(RfLagrangian *l, const void *block, size_t size)
 {
     Header header;
-    if (size < sizeof header)
-        return rf_fail(RF_BAD_INPUT, NULL, "header",
-                       "the saved state ends inside its header (%zu of %zu bytes): start again without it", size,
-                       sizeof header);
+    RF_TRY(rf_state_check(block, size, sizeof header, METHOD, VERSION, inputs_hash(l)));
     memcpy(&header, block, sizeof header);
-    RF_TRY(check_header(&header, l, block, size));
+    if (!has_its_size(&header, l, size))
+        return rf_state_damaged();
     return copy_content(l, &header, block);
 }
 

@@ -1,43 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 // Saved states of a moving texture: a header, the markers of all pixels, those that fade.
-#include "core/hash.h"
 #include "core/maths.h"
 #include "core/memory.h"
 #include "core/options.h"
 #include "core/result.h"
-#include "core/simd.h"
+#include "core/saved_state.h"
 #include "methods/optimize/moving.h"
 
 #include <string.h>
 
 enum
 {
-    STATE_VERSION = 3
+    STATE_VERSION = 4
 };
+
+static const char STATE_METHOD[] = "optimize";
 
 typedef struct StateHeader
 {
-    char magic[8];
-    uint32_t version, simd;
-    /// Of exemplar and options; and of the whole block with this field 0.
-    uint64_t inputs, content;
+    RfStateHead head;
     int32_t width, height, placed, fading;
     double time, distance;
 } StateHeader;
-
-static const char g_magic[8] = "rf-opti";
 
 static uint64_t inputs_hash(const RfExemplar *exemplar, const RfOptimizeOptions *options)
 {
     int count;
     const RfOption *table = rf_optimize_option_table(&count);
     return rf_options_hash(options, table, count, exemplar->hash);
-}
-
-static uint64_t content_hash(StateHeader header, const void *rest, size_t size)
-{
-    header.content = 0;
-    return rf_hash_bytes(rest, size, rf_hash_bytes(&header, sizeof header, 0));
 }
 
 /// A marker as it is saved. Those that fade are told by their pixel.
@@ -79,10 +69,6 @@ RfResult rf_optimize_save(const RfOptimize *o, void **block, size_t *size)
     *block = NULL;
     StateHeader header;
     memset(&header, 0, sizeof header);
-    memcpy(header.magic, g_magic, sizeof header.magic);
-    header.version = STATE_VERSION;
-    header.simd = (uint32_t)rf_simd_level();
-    header.inputs = inputs_hash(o->exemplar, &o->options);
     header.placed = o->placed;
     header.width = o->markers.width;
     header.height = o->markers.height;
@@ -95,32 +81,20 @@ RfResult rf_optimize_save(const RfOptimize *o, void **block, size_t *size)
         return RF_OUT_OF_MEMORY;
     if (o->placed)
         write_markers(&o->fading, write_markers(&o->markers, (Record *)(void *)(bytes + sizeof header)));
-    header.content = content_hash(header, bytes + sizeof header, rest);
     memcpy(bytes, &header, sizeof header);
+    rf_state_seal(bytes, sizeof header + rest, STATE_METHOD, STATE_VERSION, inputs_hash(o->exemplar, &o->options));
     *block = bytes;
     *size = sizeof header + rest;
     return RF_OK;
 }
 
-static RfResult check_state(const StateHeader *h, uint64_t inputs, const void *block, size_t size)
+static bool has_its_size(const StateHeader *h, size_t size)
 {
-    if (memcmp(h->magic, g_magic, sizeof g_magic) != 0)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "not a saved state of optimize");
-    if (h->version != STATE_VERSION)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved by version %u of the format, this is %d: start again",
-                       h->version, STATE_VERSION);
-    if (h->simd != (uint32_t)rf_simd_level())
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved under another instruction set: set RF_SIMD as it was");
-    if (h->inputs != inputs)
-        return rf_fail(RF_BAD_INPUT, NULL, "header", "saved with another exemplar or other options: start again");
     bool sized = h->placed == 1 && h->width >= 8 && h->width <= RF_MAX_SIZE && h->height >= 8 &&
                  h->height <= RF_MAX_SIZE && h->fading >= 0 && h->fading <= h->width * h->height && isfinite(h->time) &&
                  h->distance >= 0 && h->distance < 1e20;
     size_t rest = size - sizeof *h;
-    bool whole = sized ? rest == rest_size(h->width, h->height, h->fading) : h->placed == 0 && !rest;
-    if (!whole || h->content != content_hash(*h, (const uint8_t *)block + sizeof *h, rest))
-        return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
-    return RF_OK;
+    return sized ? rest == rest_size(h->width, h->height, h->fading) : h->placed == 0 && !rest;
 }
 
 static bool is_finite(RfVec2 v)
@@ -150,7 +124,7 @@ static RfResult restore(RfOptimize *o, const StateHeader *h, const uint8_t *rest
         memcpy(&record, rest + i * sizeof record, sizeof record);
         RfMarkers *m = i < pixels ? &o->markers : &o->fading;
         if (!is_sound(o, &record, i, pixels))
-            return rf_fail(RF_BAD_INPUT, NULL, "saved state", "damaged: start again");
+            return rf_state_damaged();
         m->pixels[record.pixel] = (RfMarker){record.at, record.source, record.bend, record.share, record.continued};
     }
     o->time = h->time;
@@ -165,14 +139,12 @@ RfResult rf_optimize_load(const RfExemplar *exemplar, const RfOptimizeOptions *o
     RF_REQUIRE(block, "rf_optimize_load: block is NULL");
     RF_TRY(rf_optimize_create(exemplar, options, out));
     StateHeader header;
-    RfResult result = RF_OK;
-    if (size < sizeof header)
-        result = rf_fail(RF_BAD_INPUT, NULL, "header", "a saved state is at least %zu bytes, this is %zu",
-                         sizeof header, size);
-    else
+    RfResult result =
+        rf_state_check(block, size, sizeof header, STATE_METHOD, STATE_VERSION, inputs_hash(exemplar, options));
+    if (result == RF_OK)
     {
         memcpy(&header, block, sizeof header);
-        result = check_state(&header, inputs_hash(exemplar, options), block, size);
+        result = has_its_size(&header, size) ? RF_OK : rf_state_damaged();
     }
     if (result == RF_OK && header.placed)
         result = restore(*out, &header, (const uint8_t *)block + sizeof header, size - sizeof header);
